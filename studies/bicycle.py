@@ -14,15 +14,17 @@ from models.systems.bicycle.run import run as run_scene
 from models.systems.bicycle.scene import BicycleScene
 
 SYSTEM = "bicycle"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
-def run(scene: BicycleScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: BicycleScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute the eigenvalues over speed and a run in each engine; saves ``eigenvalues.csv``, ``runs.nc`` and
     ``bicycle.png``, and returns the summary."""
     failed, runs, speeds, values = dict[str, str](), dict[str, Result](), *eigenvalues(scene)
     write_table(
-        folder / "eigenvalues.csv",
+        output_folder / "eigenvalues.csv",
         {"speed": ("m/s", speeds)}
         | {
             f"{component} {i + 1}": ("1/s", getattr(values[:, i], component))
@@ -31,22 +33,22 @@ def run(scene: BicycleScene, engines: tuple[str, ...], folder: Path, progress: P
         },
     )
     for i, engine in enumerate(engines):
-        progress(engine, i / len(engines))
+        report_progress(engine, i / len(engines))
         try:
             runs[engine] = run_scene(scene, engine, error=scene.error)
         except RunFailed as error:
             failed[engine] = str(error)
     if runs:
-        progress("figure", 1.0)
+        report_progress("figure", 1.0)
         step = min(len(result.times) for result in runs.values())
         decimated = {
             e: r if len(r.times) == step else r.every(float(r.times[-1]) / (step - 1)) for e, r in runs.items()
         }
-        join_results(decimated, "engine").save(folder / "runs.nc")
-        figure(scene, speeds, values, runs, folder / "bicycle.png")
+        join_results(decimated, "engine").save(output_folder / "runs.nc")
+        figure(scene, speeds, values, runs, output_folder / "bicycle.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": failed,
         "answer": _figures_of_runs(scene, runs),
         "results": runs,

@@ -43,18 +43,18 @@ class BicycleObservations:
 
 
 def observed_and_predicted(
-    folder: str | Path,
+    data_folder: str | Path,
     choose: Sequence[float] = (),
     bicycle: Whipple | None = None,
     base_control: Control = EXPERIMENT_FEEDBACK,
 ) -> BicycleObservations:
     """Choose suspected parameters from the measurements at the speeds ``choose`` (m/s, all by default), and predict
     weave at the other speeds; raises InputError."""
-    all_observations, bicycle = observations(folder), bicycle or load_bicycle("steer_by_wire")
+    all_observations, bicycle = observations(data_folder), bicycle or load_bicycle("steer_by_wire")
     speeds = [observation.speed for observation in all_observations]
     for speed in choose:
         if speed not in speeds:
-            raise InputError(folder, "speeds", speed, f"no windows at this speed; there are {speeds} m/s")
+            raise InputError(data_folder, "speeds", speed, f"no windows at this speed; there are {speeds} m/s")
     choice = ranked_suspects(bicycle, base_control, [o for o in all_observations if not choose or o.speed in choose])
     predictions = {}
     for observation in all_observations:

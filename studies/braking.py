@@ -20,7 +20,7 @@ from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import Stop, wheel_names
 
 SYSTEM = "braking"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 class Options(Strict):
@@ -29,7 +29,9 @@ class Options(Strict):
     adhesion: bool = Field(True, description="measure adhesion utilisation too, by many short runs")
 
 
-def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: BrakingScene, engines: tuple[str, ...], output_folder: File, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Run every procedure in each engine; saves NAME.nc, NAME.png and NAME_pressures.csv of each procedure, also of a
     failed run up to its failure, and returns the summary."""
     from studies.braking_figures import stop_figure
@@ -41,14 +43,14 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
     for i, name in enumerate(scene.procedures):
         results = dict[str, Result]()
         for j, engine in enumerate(engines):
-            progress(f"{name}, {engine}", (i * len(engines) + j) / (len(scene.procedures) * len(engines)))
+            report_progress(f"{name}, {engine}", (i * len(engines) + j) / (len(scene.procedures) * len(engines)))
             try:
                 result: Result | None = drive(scene, engine, procedure=name, error=scene.error)
             except RunFailed as error:
                 failed[f"{name}, {engine}"], result = str(error), error.partial
             if result is not None and len(result.times) > 2:
                 results[engine] = result
-                result.save(folder / (f"{name}.nc" if len(engines) == 1 else f"{name}_{engine}.nc"))
+                result.save(output_folder / (f"{name}.nc" if len(engines) == 1 else f"{name}_{engine}.nc"))
         if not results:
             if not any(run_name.startswith(f"{name}, ") for run_name in failed):
                 table.append(f"  {name}: stands within two samples of {scene.run.sample:g} s: it has no figures")
@@ -57,8 +59,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
         stop = Stop(next(iter(results.values())).detail)
         radius = plane_of(scene).radius
         measured, rims = measured_pressures_of(scene, name, radius.size), stop.path.turning * radius
-        write_pressures(folder / f"{name}_pressures.csv", stop.times, stop.path.pressures, rims)
-        stop_figure(scene, name, results, folder / f"{name}.png", measured)
+        write_pressures(output_folder / f"{name}_pressures.csv", stop.times, stop.path.pressures, rims)
+        stop_figure(scene, name, results, output_folder / f"{name}.png", measured)
         figures, remarks = dict[str, float](), list[str]()
         try:
             figures = figures_of_merit(scene, name, stop) if options.adhesion else {}
@@ -82,7 +84,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
             + comparison_lines(results)
         )
     summary = {"failed": failed, "results": all_stops, "answer": answer, "table": table}
-    return {"scene": scene.title, "folder": str(folder), **summary}
+    return {"scene": scene.title, "folder": str(output_folder), **summary}
 
 
 def rim_speed_differences(

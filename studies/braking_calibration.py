@@ -23,7 +23,7 @@ from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stops import Scatter, Stops, scatter_of, statistical_errors
 
 SYSTEM = "braking"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 PAPER_VALUES = {
     "deceleration": ("mean deceleration v0/T [m/s^2]", "1.36 +- 0.02", "1.37 +- 0.4", "fitted"),
     "aside": ("y-displacement [m]", "7.5 +- 0.7", "7.2 +- 0.3", "fitted"),
@@ -69,7 +69,9 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
         )
 
 
-def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: BrakingScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Fit friction and steer angle, and repeat the stops with them; saves the fit as ``rounds.nc`` and
     ``calibration.csv``, a fitted stop as ``calibration.nc`` and ``calibration.png``, and returns the summary."""
     from studies.braking_figures import stop_figure
@@ -79,16 +81,16 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     steer = scene.procedures[options.procedure].steer
     assert steer is not None
     scale, steps = scene.tyres.scale.get(options.surface, 1.0), []
-    progress("loading", 0.0)
+    report_progress("loading", 0.0)
     drive(scene, procedure=options.procedure)  # compiles what is not compiled yet, once and not in every worker
     with Crew.of(scene).at_work(options.runs, *folders_for_workers(scene)) as pool:
         for i in range(options.rounds):
-            progress(f"fit, round {i + 1}", i / (options.rounds + 2))
+            report_progress(f"fit, round {i + 1}", i / (options.rounds + 2))
             means = _means_of_stops(fitted_scene(scene, options, scale, steer), options, options.runs, pool)
             steps.append((scale, steer, means["deceleration"].mean, means["aside"].mean))
             scale *= FITTED_FIGURES["deceleration"] / means["deceleration"].mean
             steer *= FITTED_FIGURES["aside"] / means["aside"].mean
-        progress("as fitted", options.rounds / (options.rounds + 2))
+        report_progress("as fitted", options.rounds / (options.rounds + 2))
         fitted = fitted_scene(scene, options, scale, steer)
         scatters = _means_of_stops(fitted, options, options.last, pool, options.seed + 1)
     columns = zip(QUANTITIES_OF_ROUND.items(), np.array(steps).T, strict=True)
@@ -96,16 +98,16 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     by_rounds = with_sampling_error(
         result(scene, rounds, {}, engine="reference"), statistical_errors(means), options.runs
     )
-    by_rounds.save(folder / "rounds.nc")
+    by_rounds.save(output_folder / "rounds.nc")
     heads = (f"{name} [{unit}]" if unit else name for name, unit in QUANTITIES_OF_ROUND.items())
     rows = [",".join(heads), *(",".join(f"{value:.9g}" for value in step) for step in steps)]
-    write_whole(folder / "calibration.csv", "\n".join(rows) + "\n")
+    write_whole(output_folder / "calibration.csv", "\n".join(rows) + "\n")
     stop = drive(fitted, procedure=options.procedure, error=scene.error)
-    stop.save(folder / "calibration.nc")
-    stop_figure(fitted, options.procedure, {"as fitted": stop}, folder / "calibration.png")
+    stop.save(output_folder / "calibration.nc")
+    stop_figure(fitted, options.procedure, {"as fitted": stop}, output_folder / "calibration.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "results": {"rounds": by_rounds, "as fitted": stop},
         "table": table(options, scale, steer, scatters),

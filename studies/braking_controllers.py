@@ -20,7 +20,7 @@ from models.systems.braking.scene import BrakingScene, ControllerTable, RoadTabl
 from models.systems.braking.stop_report import Stop
 
 SYSTEM = "braking"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 SHOWN_QUANTITIES = {
     "distance [m]": "stopping distance [m]",
     "v0^2/2d [m/s^2]": "v0^2/2d [m/s^2]",
@@ -96,14 +96,16 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
         check_scene(single_scene, ("reference",))
 
 
-def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: BrakingScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Run all combinations of surface, procedure and controller; saves ``controllers.nc``, ``controllers.csv`` and
     ``controllers.png``, and returns the summary."""
     scenes, answer, failed, estimated = scene_of_each_run(scene), list[dict[str, Any]](), dict[str, str](), False
     results = dict[str, Result]()
     for i, (labels, single_scene) in enumerate(scenes.items()):
         name = ", ".join(labels)
-        progress(name, i / len(scenes))
+        report_progress(name, i / len(scenes))
         try:
             results[name] = drive(single_scene, error=scene.error)
             stop = Stop(results[name].detail)
@@ -118,10 +120,10 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         answer.append(
             dict(zip(LABEL_COLUMNS, labels, strict=True)) | shown | {LOCKED_COLUMN: float(stop.locks().time.max())}
         )
-    _save_stops(scene, answer, folder, results)
-    _figure(scene, answer, folder / "controllers.png", results)
+    _save_stops(scene, answer, output_folder, results)
+    _figure(scene, answer, output_folder / "controllers.png", results)
     summary = {"results": results, "answer": answer, "table": table(answer) + [ESTIMATED_SPEED_NOTE] * estimated}
-    return {"scene": scene.title, "folder": str(folder), "failed": failed, **summary}
+    return {"scene": scene.title, "folder": str(output_folder), "failed": failed, **summary}
 
 
 def table(stops: list[dict[str, Any]]) -> list[str]:
@@ -134,7 +136,7 @@ def table(stops: list[dict[str, Any]]) -> list[str]:
     return [*lines, "  locked: longest of the wheels, above 15 km/h"]
 
 
-def _save_stops(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path, results: Results) -> None:
+def _save_stops(scene: BrakingScene, stops: list[dict[str, Any]], output_folder: Path, results: Results) -> None:
     """Save the stops: a CSV line for each, and a netCDF result with an axis of stops, which also holds the assumptions
     that any stop broke."""
     heads = [*SHOWN_QUANTITIES, LOCKED_COLUMN] if stops else []
@@ -145,9 +147,11 @@ def _save_stops(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path, 
         for head, column in columns.items()
     }
     stops_result = result(scene, channels, texts, engine="reference")
-    (joined_result(stops_result, results) if results else stops_result).save(folder / "controllers.nc")
+    (joined_result(stops_result, results) if results else stops_result).save(output_folder / "controllers.nc")
     rows = [(*(stop[name] for name in LABEL_COLUMNS), *(f"{stop[head]:.17g}" for head in heads)) for stop in stops]
-    write_whole(folder / "controllers.csv", "".join(",".join(row) + "\n" for row in [(*LABEL_COLUMNS, *heads), *rows]))
+    write_whole(
+        output_folder / "controllers.csv", "".join(",".join(row) + "\n" for row in [(*LABEL_COLUMNS, *heads), *rows])
+    )
 
 
 PANEL_TITLES = {"v0^2/2d [m/s^2]": "equivalent deceleration [m/s²]", "yaw [deg]": "final yaw angle [deg]"}

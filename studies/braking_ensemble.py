@@ -30,7 +30,7 @@ from models.systems.braking.stops import (
 )
 
 SYSTEM = "braking"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 BLOCKS_FOLDER = "blocks"
 """Name of the folder of finished blocks in the results' folder, from which a killed run can be resumed."""
 RUNS_PER_BLOCK = 5
@@ -59,14 +59,16 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     build(merged_tables(scene.table(), options.other), f"{scene.file} with options.other", Path(scene.folder))
 
 
-def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: BrakingScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Run both ensembles of stops; saves each under its name as netCDF and CSV, and ``ensemble.png``; returns the
     summary."""
     check(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     tables = [scene.table(), merged_tables(scene.table(), options.other)][: 2 if options.other else 1]
     ensembles, results, blocks = [], dict[str, Result](), Blocks(RUNS_PER_BLOCK)
-    progress("loading", 0.0)  # compiles what is not compiled yet, once and not in every worker
+    report_progress("loading", 0.0)  # compiles what is not compiled yet, once and not in every worker
     scenes = [build(table, scene.file, Path(scene.folder)) for table in tables]
     singles = [drive(scene_of_ensemble, procedure=options.procedure, error=scene.error) for scene_of_ensemble in scenes]
     with Crew.of(scene).at_work(blocks.count(options.runs), *folders_for_workers(scene)) as pool:
@@ -74,9 +76,9 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
             job = Stops(table, scene.file, scene.folder, options.procedure, options.speed_spread, options.seed + i)
 
             def tell(finished: Done, i: int = i) -> None:
-                progress(f"{options.names[i]}: {finished}", (i + finished.done / finished.paths) / len(tables))
+                report_progress(f"{options.names[i]}: {finished}", (i + finished.done / finished.paths) / len(tables))
 
-            store = folder / BLOCKS_FOLDER / options.names[i]
+            store = output_folder / BLOCKS_FOLDER / options.names[i]
             ensembles.append(run_paths(job, options.runs, store, pool, blocks, tell))
     units = {"speed": "m/s", **{key: label.partition("[")[2][:-1] for key, label in KEPT_QUANTITIES.items()}}
     scatters = [{key: scatter_of(arrays[key]) for key in KEPT_QUANTITIES} for arrays in ensembles]
@@ -86,15 +88,15 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         channels = {key: Channel("stop", arrays[key], unit) for key, unit in units.items()}
         stops = joined_result(result(scene_of_ensemble, channels, {}, engine="reference"), {"one stop": single})
         results[name] = with_sampling_error(stops, statistical_errors(means), options.runs)
-        stops.save(folder / f"{name}.nc")
-        stops.save_table(folder / f"{name}.csv")
+        stops.save(output_folder / f"{name}.nc")
+        stops.save_table(output_folder / f"{name}.csv")
     tests = (
         {key: welch_test(scatters[0][key], scatters[1][key]) for key in KEPT_QUANTITIES} if len(ensembles) > 1 else {}
     )
-    _figure(scene, options, ensembles, scatters, tests, results, folder)
+    _figure(scene, options, ensembles, scatters, tests, results, output_folder)
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "results": results,
         "table": ensemble_lines(options, scatters, tests),
@@ -137,7 +139,7 @@ def _figure(
     scatters: list[dict[str, Scatter]],
     tests: dict[str, Welch],
     results: Results,
-    folder: Path,
+    output_folder: Path,
 ) -> None:
     from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, legend_below, save, subplots
 
@@ -162,7 +164,7 @@ def _figure(
     cloud.set(xlabel="initial speed [m/s]", ylabel="stopping distance [m]", title="More scatters than the speed")
     legend_below(figure, histogram, cloud, columns=2)
     add_heading(figure, f"{scene.title}: {options.runs} stops each{test_text}", results)
-    save(figure, folder / "ensemble.png")
+    save(figure, output_folder / "ensemble.png")
 
 
 if __name__ == "__main__":

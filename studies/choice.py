@@ -32,7 +32,7 @@ LOWEST_CHANGE, HIGHEST_CHANGE = 1e-3, 1e3
 """Ends of the axis of changes (per cent); smaller or larger changes are drawn at the ends."""
 ELEMENTS_DRAWN = 8
 """Largest number of elements whose energy activity is drawn, the most active first."""
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 class Options(Strict):
@@ -81,32 +81,34 @@ def check(scene: Any, engines: tuple[str, ...]) -> None:
             raise InputError(scene.file, "options.beside", name, 'asks for no choice: it has no effects = "auto"')
 
 
-def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(scene: Any, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress) -> dict[str, Any]:
     """Choose the effects of the scene and of further scenes; saves a CSV table for each scene, and a figure."""
     check(scene, engines)
     further_scenes = [load_scene(name, None) for name in scene.options.get("beside", [])]
-    return save_choices([scene, *further_scenes], engines, folder, progress)
+    return save_choices([scene, *further_scenes], engines, output_folder, report_progress)
 
 
-def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def save_choices(
+    scenes: list[Any], engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Choose, save and draw the effects of scenes, the first in one of ``engines``; returns the summary."""
     scene, choices = scenes[0], list[SceneChoice]()
     for i, chosen_scene in enumerate(scenes):
-        progress(chosen_scene.title, i / len(scenes))
+        report_progress(chosen_scene.title, i / len(scenes))
         linear, engines_asked = has_closed_form(chosen_scene), engines if chosen_scene is scene else ()
         plan_of(chosen_scene).check(chosen_scene, () if linear else (engine_for_choice(chosen_scene, engines_asked),))
         report_share = partial(
-            _pass_progress, progress, f"{chosen_scene.title}, of at most {RUN_BUDGET} runs", i, len(scenes)
+            _pass_progress, report_progress, f"{chosen_scene.title}, of at most {RUN_BUDGET} runs", i, len(scenes)
         )
         choices.append(
             _linear_ride_choice(chosen_scene) if linear else choice_of_scene(chosen_scene, engines_asked, report_share)
         )
-        _save_effect_table(choices[-1], folder / f"{i + 1}_{chosen_scene.system.replace('-', '_')}.csv")
-    progress("figure", 1.0)
-    choice_figure(choices, folder / "choice.png")
+        _save_effect_table(choices[-1], output_folder / f"{i + 1}_{chosen_scene.system.replace('-', '_')}.csv")
+    report_progress("figure", 1.0)
+    choice_figure(choices, output_folder / "choice.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "answer": [_summary_of_choice(choice) for choice in choices],
         "table": [line for choice in choices for line in choice_lines(choice, len(choices) > 1)],
@@ -129,10 +131,10 @@ def _results_by_name(choices: list[SceneChoice]) -> dict[str, Result]:
     }
 
 
-def _pass_progress(progress: Progress, title: str, completed: int, scene_count: int, share: float) -> None:
+def _pass_progress(report_progress: ReportProgress, title: str, completed: int, scene_count: int, share: float) -> None:
     """Report progress over several scenes: ``completed`` scenes are done, and ``share`` of the search of the current
     scene."""
-    progress(title, (completed + share) / scene_count)
+    report_progress(title, (completed + share) / scene_count)
 
 
 def has_closed_form(scene: Any) -> bool:
@@ -170,12 +172,12 @@ def search_text(scene: Any) -> str:
 
 
 def choice_of_scene(
-    scene: Any, engines: tuple[str, ...], progress: Callable[[float], None] = lambda share: None
+    scene: Any, engines: tuple[str, ...], report_progress: Callable[[float], None] = lambda share: None
 ) -> SceneChoice:
     """The choice of effects for a scene by runs in one engine."""
     engine = engine_for_choice(scene, engines)
     with Crew.of(scene, default_workers=1).at_work(PAIRS_IN_ADVANCE, *folders_for_workers(scene)) as pool:
-        chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress, executor=pool)
+        chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=report_progress, executor=pool)
         choice, full_work = chooser.choose(), chooser.work(frozenset())
     results = (
         chooser.whole.variants.results_with_errors(frozenset(choice.left_out), choice.step_factor)

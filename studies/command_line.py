@@ -339,7 +339,7 @@ def twin(
     controls: Annotated[
         Path | None, typer.Option(help="CSV of the actuators' controls over time, for the paths; constant if none.")
     ] = None,
-    folder: Annotated[
+    output_folder: Annotated[
         Path | None, typer.Option(help="Folder from which includes, meshes and pictures may come; the model's if none.")
     ] = None,
 ) -> None:
@@ -352,7 +352,7 @@ def twin(
 
     check_arguments(files, page)
     with progress_bar("building the model") as tell:
-        twin_options = TwinOptions(states, compare_paths, tolerance, quantity, controls, folder)
+        twin_options = TwinOptions(states, compare_paths, tolerance, quantity, controls, output_folder)
         twins = examine(files, listed_content_kinds(without), twin_options, tell)
     print("\n".join(twin_lines(twins)))
     if page is not None:

@@ -20,7 +20,7 @@ from models.systems.contact.run import ContactResults, cells_of, scene_contact, 
 from models.systems.contact.scene import ContactScene, Method
 
 SYSTEM = "contact"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 PRINTED_ROWS = 12
 """Approximate number of rows of a sweep that are printed; the saved file has all."""
 
@@ -38,24 +38,26 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
         raise InputError(scene.file, "study", scene.study, allowed)
 
 
-def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: ContactScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute the normal contact and the creep forces; saves forces and fields as CSV and netCDF, and figures; returns
     the summary."""
     check(scene, engines)
-    forces = run_scene(scene, error=scene.error, fields=True, progress=progress)
+    forces = run_scene(scene, error=scene.error, fields=True, progress=report_progress)
     rolls: ContactResults = forces.detail
     for name, saved in (("forces", forces), ("fields", cells_of(scene, rolls))):
         if saved is not None:
-            saved.save(folder / f"{name}.nc")
-            saved.save_table(folder / f"{name}.csv")
-    progress("figures", 0.9)
-    _draw_figures(scene, forces, folder)
+            saved.save(output_folder / f"{name}.nc")
+            saved.save_table(output_folder / f"{name}.csv")
+    report_progress("figures", 0.9)
+    _draw_figures(scene, forces, output_folder)
     body, doubts = rolls.contact, json.loads(forces.data.attrs["doubts"])
     rows = forces.data.to_dataframe().to_dict("records")
     answer = asdict(body.pressing) | {"friction": body.friction, "forces": rows, "doubt": "".join(doubts)}
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "answer": answer,
         "results": {"forces": forces},
@@ -128,7 +130,7 @@ def _contact_point_lines(scene: ContactScene) -> list[str]:
     ]
 
 
-def _draw_figures(scene: ContactScene, forces: Result, folder: Path) -> None:
+def _draw_figures(scene: ContactScene, forces: Result, output_folder: Path) -> None:
     from studies.contact_figures import contact_figure, sweep_figure
 
     rolls: ContactResults = forces.detail
@@ -142,7 +144,12 @@ def _draw_figures(scene: ContactScene, forces: Result, folder: Path) -> None:
         )
         friction = rolls.contact.friction
         contact_figure(
-            list(last_rolled.fields), friction, title, _pressure_name(rolls.contact), forces, folder / "contact.png"
+            list(last_rolled.fields),
+            friction,
+            title,
+            _pressure_name(rolls.contact),
+            forces,
+            output_folder / "contact.png",
         )
     if sweep is not None:
         note_on_others = "".join(
@@ -151,7 +158,7 @@ def _draw_figures(scene: ContactScene, forces: Result, folder: Path) -> None:
             if value and name != sweep.of
         )
         title = f"{scene.title}\nForces by {theory_text(scene.method)}{note_on_others}"
-        sweep_figure(sweep, forces, _exact_checks(scene, rolls), title, folder / "forces.png")
+        sweep_figure(sweep, forces, _exact_checks(scene, rolls), title, output_folder / "forces.png")
 
 
 CREEPAGE_SYMBOLS = (("ξx", ""), ("ξy", ""), ("spin", " 1/m"))

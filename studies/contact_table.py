@@ -13,7 +13,7 @@ from models.systems.contact.scene import ContactScene
 
 __all__ = ["BLOCKS_FOLDER"]  # what --resume goes on from
 SYSTEM = "contact"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
@@ -24,16 +24,18 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
     scene.cases_file()
 
 
-def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: ContactScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute the forces of every row into ``forces.csv``; saves the first rows and the magnitudes of all as
     ``forces.nc``, and returns the summary."""
     check(scene, engines)
-    rows = run_scene(scene, error=scene.error, answers=folder / "forces.csv", progress=progress)
-    rows.save(folder / "forces.nc")
+    rows = run_scene(scene, error=scene.error, answers=output_folder / "forces.csv", progress=report_progress)
+    rows.save(output_folder / "forces.nc")
     counts = rows.counts()
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "rows": counts,
         "answer": json.loads(rows.data.attrs["sizes"]),

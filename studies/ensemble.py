@@ -35,7 +35,7 @@ from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.virtual_measurement import check_road, follower_builder, measure, write_measurement
 from models.vehicles.pitch_plane import STATE_NAMES
 
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 BLOCKS_FOLDER = "blocks"
 """Name of the folder of finished blocks in the results' folder; a study with this constant can be resumed."""
@@ -78,7 +78,7 @@ def check(scene: Scene, engines: tuple[str, ...]) -> Options:
     return options
 
 
-def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress) -> dict[str, Any]:
     """Run all noise paths in the reference, and the first paths in the other engines; saves ``ensemble.nc``, a table
     and a figure, and returns the summary."""
     options = check(scene, engines)
@@ -88,7 +88,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     statistics = PathStatistics(true, max(options.saved, options.engine_paths))
 
     def tell(finished: Done) -> None:
-        progress(f"reference: {finished}", finished.done / finished.paths)
+        report_progress(f"reference: {finished}", finished.done / finished.paths)
 
     crew, cut = Crew.of(scene), Blocks(options.block)
     with TemporaryDirectory() as name, crew.at_work(cut.count(options.paths)) as pool:
@@ -97,11 +97,13 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         noisy = follower_builder(scene, Path(name))({}, {"force_noise": noise})
         first = run_with_drift(noisy, "reference", scene.error)
         path_arguments = (noisy, row_times, measured["pitch"], options.threshold)
-        for block in each_block(noise_paths(*path_arguments), options.paths, folder / BLOCKS_FOLDER, pool, cut, tell):
+        for block in each_block(
+            noise_paths(*path_arguments), options.paths, output_folder / BLOCKS_FOLDER, pool, cut, tell
+        ):
             statistics.add(block)
         gaps = {}
         for engine in (engine for engine in engines if engine != "reference"):
-            progress(f"{engine}: {options.engine_paths} of the same paths", 1.0)
+            report_progress(f"{engine}: {options.engine_paths} of the same paths", 1.0)
             if engine == "mujoco":
                 repeated = run_paths(mujoco_threads(*path_arguments, crew.workers), options.engine_paths)
             else:
@@ -109,18 +111,18 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
                     noise_paths(*path_arguments, engine), options.engine_paths, executor=pool, blocks=Blocks(1)
                 )
             gaps[engine] = largest_difference(statistics.first, repeated, row_times)
-    write_measurement(measured, folder, period)
+    write_measurement(measured, output_folder, period)
     rows = _deviation_rows(options, row_times, statistics)
     channels, axes = _result_channels(row_times, statistics, options.saved)
     saved = result(noisy, channels, axes, engine="reference", threshold=options.threshold)
-    _with_errors(saved, first, rows, options, statistics).save(folder / "ensemble.nc")
+    _with_errors(saved, first, rows, options, statistics).save(output_folder / "ensemble.nc")
     table = summary_lines(options, scene, rows, statistics, gaps)
-    write_whole(folder / "table.txt", "\n".join(table) + "\n")
+    write_whole(output_folder / "table.txt", "\n".join(table) + "\n")
     results = {"measurement": measured, "all paths": saved}
-    _figure(row_times, statistics, options, results, folder)
+    _figure(row_times, statistics, options, results, output_folder)
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "results": results,
         "paths": options.paths,
         "rows": rows,
@@ -237,7 +239,9 @@ def _time_text(seconds: float) -> str:
     return f"{seconds:.2f}" if np.isfinite(seconds) else "never"
 
 
-def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, results: Results, folder: Path) -> None:
+def _figure(
+    times: np.ndarray, statistics: PathStatistics, options: Options, results: Results, output_folder: Path
+) -> None:
     """Save a figure of percentiles of the pitch error over time, and of a histogram of the drift-off times."""
 
     from models.drawing.drift import draw_quantile_bands
@@ -263,7 +267,7 @@ def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, res
         axes.set_xlabel("time [s]")
     title = f"{options.paths} noise paths of one measured run, forces at {options.sampling_rate:g} Hz"
     add_heading(figure, title, results)
-    save(figure, folder / "ensemble.png")
+    save(figure, output_folder / "ensemble.png")
 
 
 if __name__ == "__main__":

@@ -12,11 +12,13 @@ from models.systems.handling.run import run as run_scene
 from models.systems.handling.scene import HandlingScene
 
 SYSTEM = "handling"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 DIFFERENCE_TITLE = "largest difference of the engines"
 
 
-def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: HandlingScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Run every manoeuvre in every engine; saves NAME.nc with all engines' runs and NAME.png for each manoeuvre, and
     returns the summary."""
     from studies.handling_figures import manoeuvre_figure
@@ -25,15 +27,15 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
     for i, name in enumerate(scene.manoeuvres):
         runs = dict[str, Result]()
         for j, engine in enumerate(engines):
-            progress(f"{name}, {engine}", (i + j / len(engines)) / len(scene.manoeuvres))
+            report_progress(f"{name}, {engine}", (i + j / len(engines)) / len(scene.manoeuvres))
             try:
                 runs[engine] = run_scene(scene, engine, name, error=scene.error)
             except RunFailed as error:
                 failed[f"{name}, {engine}"] = str(error)
         if runs:
-            join_results(runs, "engine").save(folder / f"{name}.nc")
+            join_results(runs, "engine").save(output_folder / f"{name}.nc")
             title = name.replace("_", " ").capitalize() if len(scene.manoeuvres) > 1 else scene.title
-            manoeuvre_figure(runs, title, folder / f"{name}.png")
+            manoeuvre_figure(runs, title, output_folder / f"{name}.png")
             results |= {f"{name}, {engine}": run for engine, run in runs.items()}
             answer[name] = _figures_of_runs(runs)
             lines.append(_manoeuvre_line(name, answer[name]))
@@ -43,7 +45,7 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
     )
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": failed,
         "answer": answer,
         "results": results,

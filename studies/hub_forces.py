@@ -25,18 +25,18 @@ def check(scene: HubScene, engines: tuple[str, ...]) -> None:
     read(Options, scene.options, scene.file, "options")
 
 
-def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(scene: HubScene, engines: tuple[str, ...], output_folder: Path, report_progress: Progress) -> dict[str, Any]:
     """Measure hub forces virtually; run the vehicle free, with the Kalman filter and with prescribed roll and pitch.
     Saves the measurement, all runs and two figures; returns the summary."""
     from studies.hub_forces_figures import damage_figure, drift_figure
 
-    comparison = compare(scene, engines, progress)
-    save(comparison, folder)
-    drift_figure(comparison, scene.title, folder / "drift.png")
-    damage_figure(comparison, scene.title, folder / "damage.png")
+    comparison = compare(scene, engines, report_progress)
+    save(comparison, output_folder)
+    drift_figure(comparison, scene.title, output_folder / "drift.png")
+    damage_figure(comparison, scene.title, output_folder / "damage.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "answer": comparison.figures(),
         "results": comparison.results,
@@ -76,7 +76,7 @@ def _table_lines(scene: HubScene, comparison: Comparison) -> list[str]:
     return lines
 
 
-def save(comparison: Comparison, folder: Path) -> None:
+def save(comparison: Comparison, output_folder: Path) -> None:
     """Save the measurement as CSV files of a user, all runs as ``runs.nc``, and the motion of the chassis as
     ``runs.csv``."""
     measurement = comparison.measurement
@@ -85,9 +85,9 @@ def save(comparison: Comparison, folder: Path) -> None:
         for hub in measurement.vehicle.hubs
         for name, units in COLUMNS_OF_HUB.items()
     ]
-    _write_samples(folder / "hub_forces.csv", names, measurement.forces)
+    _write_samples(output_folder / "hub_forces.csv", names, measurement.forces)
     _write_samples(
-        folder / "angles.csv",
+        output_folder / "angles.csv",
         [(name, next(iter(units))) for name, units in COLUMNS_OF_ANGLES.items()],
         measurement.angles,
     )
@@ -99,8 +99,8 @@ def save(comparison: Comparison, folder: Path) -> None:
         for name, path in runs.items()
         for channel in channels
     }
-    write_time_series(folder / "runs.csv", columns, float(next(iter(comparison.runs.values())).times[1]))
-    join_results(runs, "run").save(folder / "runs.nc")
+    write_time_series(output_folder / "runs.csv", columns, float(next(iter(comparison.runs.values())).times[1]))
+    join_results(runs, "run").save(output_folder / "runs.nc")
 
 
 def _write_samples(path: Path, names: list[tuple[str, str]], sampled: Any) -> None:

@@ -30,7 +30,7 @@ from models.systems.pitch_plane.assumptions import watch_function
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 Positive = Annotated[float, Field(gt=0)]
 Minutes = Annotated[float, Field(ge=0.1, le=600)]
 
@@ -78,11 +78,11 @@ def check(scene: Scene, engines: tuple[str, ...]) -> Options:
     return options
 
 
-def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress) -> dict[str, Any]:
     """Run the vehicle on the road in each engine, and compute angle and damage errors of all gyro grades; saves runs, a
     table and two figures, and returns the summary."""
     options = check(scene, engines)
-    progress("angle errors", 0.0)
+    report_progress("angle errors", 0.0)
     length = round(60 * options.durations[-1])
     paths = unit_angle_error_paths(
         options.samples, options.sampling_rate, length, options.correlation_time, options.seed
@@ -93,13 +93,13 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     results: dict[str, Result] = {}
     failed: dict[str, str] = {}
     for i, engine in enumerate(engines):
-        progress(f"{engine}: run and damage", (i + 0.5) / (len(engines) + 1))
+        report_progress(f"{engine}: run and damage", (i + 0.5) / (len(engines) + 1))
         try:
             result = simulate(scene, engine, error=scene.error)
         except RunFailed as error:
             failed[engine] = str(error)
             continue
-        result.every(SAVED_SPACING).save(folder / f"{engine}.nc")
+        result.every(SAVED_SPACING).save(output_folder / f"{engine}.nc")
         results[engine] = result
         curves[engine] = log_damage_over_pitch_error(result, reach, scene.file)
     pairs = [(grade, minutes) for grade in range(len(options.grades)) for minutes in options.durations]
@@ -107,16 +107,16 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         _row_of_grade(options, grade, minutes, angle_errors(paths, options, grade), curves) for grade, minutes in pairs
     ]
     table = summary_lines(rows, options, tuple(curves))
-    write_whole(folder / "table.txt", "\n".join(table) + "\n")
+    write_whole(output_folder / "table.txt", "\n".join(table) + "\n")
     if curves:
         from models.drawing.figures import save
 
         results["units"] = _errors_of_grades(scene, paths, options, next(iter(curves.values())))
-        save(_figure_grades(rows, options, results), folder / "grades.png")
-        save(_figure_curve(next(iter(curves.values()))), folder / "damage_of_an_angle.png")
+        save(_figure_grades(rows, options, results), output_folder / "grades.png")
+        save(_figure_curve(next(iter(curves.values()))), output_folder / "damage_of_an_angle.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "rows": rows,
         "cheapest": coarsest_sufficient_grade(rows, options),
         "failed": failed,

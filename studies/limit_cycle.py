@@ -16,7 +16,7 @@ from models.systems.wheelset.run import ORBIT_CHANNELS, branch_result, cycle_spe
 from models.systems.wheelset.scene import WheelsetScene
 
 SYSTEM = "wheelset"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 class Options(Strict):
@@ -36,7 +36,9 @@ def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
         raise InputError(scene.file, "speeds", None, "a branch needs a range of speeds: give start and stop")
 
 
-def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: WheelsetScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute the branch of limit cycles over speed, and the cycle at one speed in every engine; saves ``branch`` and
     ``cycle_ENGINE.nc``, and figures; returns the summary.
 
@@ -46,26 +48,26 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
 
     options = read(Options, scene.options, scene.file, "options")
     branched = branch_result(
-        scene, lambda count: progress("branch of cycles", 0.6 * count / (count + 10)), error=scene.error
+        scene, lambda count: report_progress("branch of cycles", 0.6 * count / (count + 10)), error=scene.error
     )
     orbits, notes = branched.detail, json.loads(branched.data.attrs["doubts"])
     speed = options.speed or cycle_speed(scene, orbits)
-    progress(f"cycle at {speed:g} m/s", 0.6)
+    report_progress(f"cycle at {speed:g} m/s", 0.6)
     results, failed = cycles_of_engines(scene, engines, speed, error=scene.error)
     by_engine: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
     for engine, result in results.items():
-        result.save(folder / f"cycle_{engine}.nc")
+        result.save(output_folder / f"cycle_{engine}.nc")
     if orbits:
-        branched.save(folder / "branch.nc")
-        branched.save_table(folder / "branch.csv", *ORBIT_CHANNELS)
-        branch_figure(branched, wheelset_of(scene), scene.title, folder / "branch.png")
+        branched.save(output_folder / "branch.nc")
+        branched.save_table(output_folder / "branch.csv", *ORBIT_CHANNELS)
+        branch_figure(branched, wheelset_of(scene), scene.title, output_folder / "branch.png")
     if by_engine:
-        cycle_figure(results, scene.title, folder / "cycle.png")
+        cycle_figure(results, scene.title, output_folder / "cycle.png")
     else:
         notes.append(f"at {speed:g} m/s a motion from {1e3 * scene.run.displacement:g} mm dies out: no cycle")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": failed,
         "answer": {
             "branch": [_numbers_of_orbit(orbit, *ORBIT_CHANNELS) for orbit in orbits],

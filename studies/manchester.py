@@ -23,7 +23,7 @@ from models.systems.wheel_rail.run import (
 from models.systems.wheel_rail.scene import WheelRailScene
 
 SYSTEM = "wheel-rail"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 FLANGE_ANGLE = 0.8
 """Contact angle (rad) above which a patch counts as flange contact."""
 PANEL_TITLES = {
@@ -54,28 +54,30 @@ TABLE_NOTES = [
 ]
 
 
-def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: WheelRailScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute every case at every displacement; saves each as netCDF and as CSV tables of positions and patches, and a
     figure; returns the summary."""
     results, failed, table = dict[str, Result](), dict[str, str](), list[str]()
     for k, (name, case) in enumerate(scene.cases.items()):
         result = results[name] = system.run(
-            scene, case=name, progress=partial(_report_progress, progress, scene, k), error=scene.error
+            scene, case=name, progress=partial(_report_progress, report_progress, scene, k), error=scene.error
         )
         contacts = result.detail
         failed |= {f"{name}, {shift:g} mm": why for shift, why in contacts.failures.items()}
         text = f"{case_text(case.yaw, case.friction)}; {cost(contacts.seconds)} a position"
         table += [f"  {name}: {text}", *_table_lines(contacts.placed)]
         if contacts.placed:
-            _save_tables(name, result, folder)
+            _save_tables(name, result, output_folder)
     if drawn := {name: result for name, result in results.items() if result.detail.placed}:
-        _figure(scene, drawn, folder / "manchester.png")
+        _figure(scene, drawn, output_folder / "manchester.png")
     answer = {
         name: [position_quantities(placed) for placed in result.detail.placed] for name, result in results.items()
     }
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": failed,
         "answer": answer,
         "results": results,
@@ -84,16 +86,16 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
 
 
 def _report_progress(
-    progress: Progress, scene: WheelRailScene, case_number: int, lateral_shift: float, share: float
+    report_progress: ReportProgress, scene: WheelRailScene, case_number: int, lateral_shift: float, share: float
 ) -> None:
-    progress(f"{[*scene.cases][case_number]} at {lateral_shift:g} mm", (case_number + share) / len(scene.cases))
+    report_progress(f"{[*scene.cases][case_number]} at {lateral_shift:g} mm", (case_number + share) / len(scene.cases))
 
 
-def _save_tables(name: str, result: Result, folder: Path) -> None:
+def _save_tables(name: str, result: Result, output_folder: Path) -> None:
     """Save the result of a case: netCDF, a CSV table with a row for each position, and one with a row for each patch
     for each wheel."""
-    result.save(folder / f"{name}.nc")
-    result.save_table(folder / f"{name}.csv", *POSITION_UNITS)
+    result.save(output_folder / f"{name}.nc")
+    result.save_table(output_folder / f"{name}.csv", *POSITION_UNITS)
     units = {"shift": "mm", "patch": "-", **{key: unit for key, (unit, _, _) in PATCH_QUANTITIES.items()}}
     positions = [position_quantities(placed) for placed in result.detail.placed]
     for wheel in WHEEL_NAMES:
@@ -103,7 +105,7 @@ def _save_tables(name: str, result: Result, folder: Path) -> None:
             for k, patch in enumerate(position[wheel], 1)
         ]
         columns = {key: (unit, np.array([row[key] for row in rows])) for key, unit in units.items()}
-        write_table(folder / f"{name}_{wheel}.csv", columns)
+        write_table(output_folder / f"{name}_{wheel}.csv", columns)
 
 
 def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> None:

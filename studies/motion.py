@@ -45,7 +45,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.sampling import write
 from models.systems.pitch_plane.scene import Scene
 
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 COMPARED_CHANNELS = {"pitch": ("pitch", "rad"), "rate": ("pitch_rate", "rad/s"), "heave": ("z3", "m")}
 """Channel of the run and its unit, for each compared quantity."""
 TABLE_TILT = 1e-3
@@ -83,7 +83,7 @@ class Source:
         return StartState.pitched(*first) if self.truth else StartState()
 
 
-def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress) -> dict[str, Any]:
     """Take readings of each engine's run or of the file, and recover the motion by each method; saves the motions, a
     table and a figure, and returns the summary."""
     options, p = check(scene, engines)
@@ -92,27 +92,29 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     sources: list[Source] = []
     results: dict[str, Result] = {}
     for i, name in enumerate(engines if options.file is None else (options.file,)):
-        progress(f"{name}: readings and motion", i / len(engines))
+        report_progress(f"{name}: readings and motion", i / len(engines))
         try:
             source = (
-                _readings_of_run(scene, name, folder) if options.file is None else _measured_readings(scene, options, p)
+                _readings_of_run(scene, name, output_folder)
+                if options.file is None
+                else _measured_readings(scene, options, p)
             )
             _recover_motions(source, array, options, p)
         except (RunFailed, GimbalLock) as error:
             failed[name] = str(error)
             continue
         results |= {} if source.run is None else {name: source.run}
-        results[f"{name}: motion"] = _save_motions(scene, source, folder, options)
+        results[f"{name}: motion"] = _save_motions(scene, source, output_folder, options)
         sources.append(source)
     arranged = ["  The sensors", *(f"    {line}" for line in array.describe())]
     table = [*arranged, *(line for source in sources for line in _screen_lines(source, p)), *_closing_lines(options)]
-    write_whole(folder / "table.txt", "\n".join(table) + "\n")
-    progress("figure", 1.0)
+    write_whole(output_folder / "table.txt", "\n".join(table) + "\n")
+    report_progress("figure", 1.0)
     if sources:
-        _figure(sources[0], results, folder / "motion.png")
+        _figure(sources[0], results, output_folder / "motion.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": failed,
         "results": results,
         "table": table,
@@ -165,11 +167,11 @@ def _readings_of_file(name: str, path: Path, parameters: Parameters) -> Source:
     return Source(name, values.reshape(len(values), -1, 3), period)
 
 
-def _readings_of_run(scene: Scene, engine: str, folder: Path) -> Source:
+def _readings_of_run(scene: Scene, engine: str, output_folder: Path) -> Source:
     """Readings of an engine's run, which are written to a file and read again like measured readings."""
     p = scene.effects["accelerometers"]
     computed = simulate(scene, engine, error=scene.error)
-    path = folder / f"{engine} readings.csv"
+    path = output_folder / f"{engine} readings.csv"
     write(computed, {channel: channel for channel in chain(*channels_of_sensors(p))}, p.sampling_rate, path)
     source = _readings_of_file(engine, path, p)
     rows = np.searchsorted(computed.times, source.period * (np.arange(len(source.readings)) - 1e-3))
@@ -222,7 +224,7 @@ def _compared_values(motion: RecoveredMotion) -> dict[str, np.ndarray]:
     return {"pitch": motion.angles()[:, 1], "rate": motion.rates[:, 1], "heave": motion.position[:, 2]}
 
 
-def _save_motions(scene: Scene, readings_source: Source, folder: Path, options: Options) -> Result:
+def _save_motions(scene: Scene, readings_source: Source, output_folder: Path, options: Options) -> Result:
     """Save the recovered pitch, pitch rate and heave: a CSV file per method, and a netCDF result with all methods,
     which is returned."""
     stem, values_of_methods = (
@@ -231,7 +233,7 @@ def _save_motions(scene: Scene, readings_source: Source, folder: Path, options: 
     )
     for method_name, moved_values in values_of_methods.items():
         columns = {name: (COMPARED_CHANNELS[name][1], values) for name, values in moved_values.items()}
-        write_time_series(folder / f"{stem}, {method_name}.csv", columns, readings_source.period)
+        write_time_series(output_folder / f"{stem}, {method_name}.csv", columns, readings_source.period)
     channels = {
         name: Channel(("way", "time"), [moved_values[name] for moved_values in values_of_methods.values()], unit)
         for name, (_, unit) in COMPARED_CHANNELS.items()
@@ -252,7 +254,7 @@ def _save_motions(scene: Scene, readings_source: Source, folder: Path, options: 
             "the table has the error of each way beside the run" if readings_source.truth else "no truth is known"
         )
         not_estimated(saved, f"noise and mounts err most, and {truth_text}")
-    saved.save(folder / f"{stem} moved_values.nc")
+    saved.save(output_folder / f"{stem} moved_values.nc")
     return saved
 
 

@@ -22,7 +22,7 @@ from models.systems.single_track.scene import SingleTrackScene, build
 from studies.command.identify import identification_lines, identification_record
 
 SYSTEM = "single-track"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 AIMED_ERRORS = {"yaw rate": 0.12, "lateral acceleration": 0.12, "side slip": 0.25}
 """Aim for the rms prediction error of each channel, divided by the rms of the measurement."""
 
@@ -73,26 +73,28 @@ def check(scene: SingleTrackScene, engines: tuple[str, ...]) -> None:
         raise InputError(scene.file, "options.prediction", options.prediction, "needs options.measurement beside it")
 
 
-def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: SingleTrackScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Identify the vehicle, predict its motion, and compare with simpler vehicles; saves ``race_car.png``,
     ``predicted.nc`` and the measured drives, and returns the summary."""
     from studies.race_car_figure import draw
 
     options = read(Options, scene.options, scene.file, "options")
-    first, second = identification_and_test_scenes(scene, options, folder)
+    first, second = identification_and_test_scenes(scene, options, output_folder)
     chosen = identified_vehicle(
         first,
         second,
         ParameterSearch(options.identified_keys(), list(AIMED_ERRORS), options.low_pass, options.blocks),
-        progress,
+        report_progress,
     )
-    simpler = {name: identified_simpler(first, second, options, name, progress) for name in SIMPLER_VEHICLES}
-    draw(chosen, simpler, scene.title, folder / "race_car.png")
+    simpler = {name: identified_simpler(first, second, options, name, report_progress) for name in SIMPLER_VEHICLES}
+    draw(chosen, simpler, scene.title, output_folder / "race_car.png")
     solved = chosen.uncertainty.fit
     predicted = SceneModel(second, [identified_one.name for identified_one in solved.problem.parameters], "").result(
         solved.values
     )
-    predicted.save(folder / "predicted.nc")
+    predicted.save(output_folder / "predicted.nc")
     answer = error_ratios(chosen)
     answer["identified"] = identification_record(chosen.uncertainty)
     answer["simpler vehicles"] = {
@@ -102,7 +104,7 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     answer["residuals"] = residual_correlations(chosen)
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "answer": answer,
         "results": {"prediction": predicted},
@@ -115,18 +117,20 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
 
 
 def identification_and_test_scenes(
-    scene: SingleTrackScene, options: Options, folder: Path
+    scene: SingleTrackScene, options: Options, output_folder: Path
 ) -> tuple[SingleTrackScene, SingleTrackScene]:
     """Scene of the drive's section for identification, and scene of the section for prediction; measured drives are
-    written into ``folder``."""
+    written into ``output_folder``."""
     if not options.measurement:
         full_scene, path = scene, scene.path(scene.drive.file, "drive.file")
     else:
-        path = write_plain_table(_data_file(scene, options.measurement, "options.measurement"), folder / "measured.csv")
+        path = write_plain_table(
+            _data_file(scene, options.measurement, "options.measurement"), output_folder / "measured.csv"
+        )
         full_scene = _scene_with_car(scene, path, RACE_CAR)
     if options.prediction:
         prediction_file = write_plain_table(
-            _data_file(scene, options.prediction, "options.prediction"), folder / "predicted.csv"
+            _data_file(scene, options.prediction, "options.prediction"), output_folder / "predicted.csv"
         )
         return full_scene, _scene_with_car(scene, prediction_file, RACE_CAR)
     from models.measured.drive import read_drive
@@ -154,7 +158,11 @@ def _scene_of_section(scene: SingleTrackScene, ends: list[float]) -> SingleTrack
 
 
 def identified_simpler(
-    first_scene: SingleTrackScene, second_scene: SingleTrackScene, options: Options, name: str, progress: Progress
+    first_scene: SingleTrackScene,
+    second_scene: SingleTrackScene,
+    options: Options,
+    name: str,
+    report_progress: ReportProgress,
 ) -> IdentifiedVehicle:
     """Identification and prediction with a simpler vehicle, of which some parameters are fixed and fewer are
     identified."""
@@ -163,7 +171,7 @@ def identified_simpler(
     simpler_search = ParameterSearch(parameters, list(AIMED_ERRORS), options.low_pass, blocks=2)
 
     def tell(text: str, share: float) -> None:
-        progress(f"{name}: {text}", 0.95)
+        report_progress(f"{name}: {text}", 0.95)
 
     return identified_vehicle(_with_values(first_scene, holds), _with_values(second_scene, holds), simpler_search, tell)
 

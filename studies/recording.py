@@ -26,18 +26,18 @@ def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
     read(Options, scene.options, scene.file, "options")
 
 
-def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: Any) -> dict[str, Any]:
+def run(scene: MeasuredScene, engines: tuple[str, ...], output_folder: Path, report_progress: Any) -> dict[str, Any]:
     """Check, run and judge the recording; saves the result and the page, the page even if errors in the recording
     prevent the run; returns the summary."""
     from studies.recording_page import write
 
-    result = run_scene(scene, engines[-1], folder, progress, whole_run=True, error=scene.error)
+    result = run_scene(scene, engines[-1], output_folder, report_progress, whole_run=True, error=scene.error)
     exam: Examination = result.detail
-    result.save(folder / "recording.nc")
-    page = write(exam, folder / "recording.html", result)
+    result.save(output_folder / "recording.nc")
+    page = write(exam, output_folder / "recording.html", result)
     return {
         "scene": exam.scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": _failure_reasons(exam),
         "page": str(page),
         "results": {exam.chosen_run: result},

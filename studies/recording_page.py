@@ -42,9 +42,9 @@ def write(examination: Examination, path: Path, result: Result) -> Path:
     return path
 
 
-def page_text(examination: Examination, folder: Path, result: Result) -> str:
+def page_text(examination: Examination, output_folder: Path, result: Result) -> str:
     """HTML text of a recording's page, with the stated errors and assumptions of the result; figures are drawn into
-    ``folder`` and embedded."""
+    ``output_folder`` and embedded."""
     environment = environment_of(Path(__file__).parent)
     environment.filters |= {"as": format, "png": lambda path: base64.b64encode(path.read_bytes()).decode()}
     library = examination.engine if examination.engine != "reference" else "numpy"
@@ -63,9 +63,9 @@ def page_text(examination: Examination, folder: Path, result: Result) -> str:
             if consequence.section_force
             for finding in [consequence.finding]
         },
-        figures=_page_figures(examination, folder),
+        figures=_page_figures(examination, output_folder),
         limits={"disagrees": LARGEST_DISAGREEMENT, "force": FORCE_LIMITS, "damage": DAMAGE_LIMITS},
-        forces=_section_force_content(examination, examination.outcome, folder)
+        forces=_section_force_content(examination, examination.outcome, output_folder)
         if examination.outcome is not None
         else None,
         sizes=[
@@ -83,28 +83,28 @@ def page_text(examination: Examination, folder: Path, result: Result) -> str:
     )
 
 
-def _page_figures(examination: Examination, folder: Path) -> dict[str, Any]:
+def _page_figures(examination: Examination, output_folder: Path) -> dict[str, Any]:
     """Figures of the recording's page by name: input forces, findings above a note, drift of the runs, and measured
     channels that were not inputs of the run."""
-    figures: dict[str, Any] = {"inputs": draw.inputs_figure(examination, folder / "inputs.png")}
+    figures: dict[str, Any] = {"inputs": draw.inputs_figure(examination, output_folder / "inputs.png")}
     figures["findings"] = [
-        (finding, draw.figure_of_finding(finding, examination.evidence, folder / f"finding_{i}.png"))
+        (finding, draw.figure_of_finding(finding, examination.evidence, output_folder / f"finding_{i}.png"))
         for i, finding in enumerate(examination.findings)
         if finding.weight != "note"
     ]
     if examination.runs:
-        figures["drift"] = draw.drift_figure(examination, folder / "drift.png")
+        figures["drift"] = draw.drift_figure(examination, output_folder / "drift.png")
     if examination.outcome is not None and examination.channel_comparisons:
         shown = [
             comparison for comparison in examination.channel_comparisons if comparison.signal.check
         ] or examination.channel_comparisons
         figures["checks"] = draw.overlay_figure(
-            examination, examination.outcome, shown[:DRAWN_FORCES], folder / "checks.png"
+            examination, examination.outcome, shown[:DRAWN_FORCES], output_folder / "checks.png"
         )
     return figures
 
 
-def _section_force_content(examination: Examination, outcome: SectionOutcome, folder: Path) -> dict[str, Any]:
+def _section_force_content(examination: Examination, outcome: SectionOutcome, output_folder: Path) -> dict[str, Any]:
     """Content of the page's part on section forces: load counts of the varying forces, number of the constant ones, and
     figures of the first few."""
     moving = {
@@ -125,6 +125,6 @@ def _section_force_content(examination: Examination, outcome: SectionOutcome, fo
             {a: counts for a, counts in moving.items() if (a.section in connectors) is is_connector}
             for is_connector in (True, False)
         ],
-        "forces": draw.forces_figure(outcome, first, folder / "forces.png", examination.chosen_run),
-        "counting": draw.counting_figure({answer: moving[answer] for answer in first}, folder / "counting.png"),
+        "forces": draw.forces_figure(outcome, first, output_folder / "forces.png", examination.chosen_run),
+        "counting": draw.counting_figure({answer: moving[answer] for answer in first}, output_folder / "counting.png"),
     }

@@ -34,7 +34,7 @@ from models.vehicles.spatial import PartOutput, PointOutput, SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 
 SYSTEM = "ride"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 SIMPLER_ROADS = {
     "axles independent": ("", "uncorrelated"),
     "axles alike": ("", "equal"),
@@ -69,7 +69,9 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     check_linear(scene, vehicle_of(scene))
 
 
-def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: RideScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute standard deviations over speeds and road correlations; saves ``deviations.nc`` and ``.csv``, the linear
     system as ``system.npz`` and ``.mat``, and figures; returns the summary."""
     from studies.ride_figures import Heading, body_acceleration_figure, outputs_figure, road_figure, spectra_figure
@@ -82,14 +84,14 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     roads = _correlations(scene, vehicle)
     results = {}
     for i, engine in enumerate(engines):
-        progress(f"linear vehicle of {engine}", 0.6 * i / len(engines))
+        report_progress(f"linear vehicle of {engine}", 0.6 * i / len(engines))
         results[engine] = run_scene(scene, engine, points=SweepPoints([*speeds, speed], roads), error=scene.error)
     sweeps = {engine: result.detail for engine, result in results.items()}
     first, linear = sweeps[engines[0]], linear_vehicle(vehicle, engines[0])(speed)
-    progress("figures", 0.7)
+    report_progress("figures", 0.7)
     top = Heading(scene.title, results)
-    _save_deviations(results, folder)
-    _save_system(scene, linear, speed, folder)
+    _save_deviations(results, output_folder)
+    _save_system(scene, linear, speed, output_folder)
     if vehicle_with_points := _with_points_along_body(vehicle):
         plain = scene.model_copy(update={"weighting": {}})
         sweep_of_points = run_scene(
@@ -97,20 +99,20 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         ).detail
         point_positions = [output.point[0] for output in vehicle_with_points.outputs if isinstance(output, PointOutput)]
         body_acceleration_figure(
-            point_positions, sweep_of_points, first, vehicle, speed, top, folder / "body_acceleration.png"
+            point_positions, sweep_of_points, first, vehicle, speed, top, output_folder / "body_acceleration.png"
         )
     kinds = [output.kind for output in vehicle.outputs] + ["acceleration"] * len(scene.weighting)
     panels = list(zip(kinds, first.units, strict=True))
-    outputs_figure(first, panels, static_loads(vehicle), top, folder / "over_speed.png")
-    spectra_figure(linear, excitation_of(scene, wheel_positions), speed, top, folder / "spectra.png")
+    outputs_figure(first, panels, static_loads(vehicle), top, output_folder / "over_speed.png")
+    spectra_figure(linear, excitation_of(scene, wheel_positions), speed, top, output_folder / "spectra.png")
     fitted = fitted_road(scene) if scene.road.file else None
     road, y = road_of(scene, wheel_positions), half_track_of(scene, wheel_positions)
-    road_figure(road, y, fitted, top, folder / "road.png")
+    road_figure(road, y, fitted, top, output_folder / "road.png")
     texts = (road.label(y), *noise_sharing_text(scene, wheel_positions), *(fitted.notes if fitted else ()))
     notes = [*(f"  question: {text}" for text in frequency_doubts(vehicle)), *(f"  road: {text}" for text in texts)]
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "results": results,
         "answer": _summary_of_deviations(first),
@@ -144,18 +146,18 @@ def _with_points_along_body(vehicle: SpatialVehicle) -> SpatialVehicle | None:
     return replace(vehicle, outputs=tuple(outputs))
 
 
-def _save_deviations(results: Mapping[str, Result], folder: Path) -> None:
+def _save_deviations(results: Mapping[str, Result], output_folder: Path) -> None:
     """Save the standard deviations by every engine over case, speed and output, without the last speed, which is only
     for the tables."""
     joined = join_results(results, "engine")
     saved = derived_result(
         Result(joined.data.isel(speed=slice(-1))), results, "the Lyapunov equation of nudged matrices"
     )
-    saved.save(folder / "deviations.nc")
-    write_whole(folder / "deviations.csv", saved.data["deviation"].drop_vars("unit").to_dataframe().to_csv())
+    saved.save(output_folder / "deviations.nc")
+    write_whole(output_folder / "deviations.csv", saved.data["deviation"].drop_vars("unit").to_dataframe().to_csv())
 
 
-def _save_system(scene: RideScene, linear_vehicle: LinearVehicle, speed: float, folder: Path) -> None:
+def _save_system(scene: RideScene, linear_vehicle: LinearVehicle, speed: float, output_folder: Path) -> None:
     """Save the matrices of the linear system at a speed (m/s), and its covariance, for other programs."""
     from models.ride.covariance import stationary_covariance
     from models.ride.excited import vehicle_with_road
@@ -165,7 +167,7 @@ def _save_system(scene: RideScene, linear_vehicle: LinearVehicle, speed: float, 
     system = system_with_weightings(
         vehicle_with_road(linear_vehicle, excitation_of(scene, linear_vehicle.wheels), speed), scene.weighting
     )
-    write_exports(system, stationary_covariance(system), folder / "system")
+    write_exports(system, stationary_covariance(system), output_folder / "system")
 
 
 def _summary_of_deviations(sweep: Sweep) -> dict[str, Any]:

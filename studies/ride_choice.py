@@ -24,7 +24,7 @@ from models.systems.ride.scene import RideScene
 from studies.choice import save_choices
 
 SYSTEM = "ride"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 LOWEST_CHANGE, HIGHEST_CHANGE = 1e-4, 1e3
 """Ends of the axis of changes (per cent); smaller or larger changes are drawn at the ends."""
@@ -63,29 +63,31 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
         )
 
 
-def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: RideScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Choose the effects of a ride scene, by runs for nonlinear springs; saves ``choice.nc``, two CSV files, a figure
     and files of the reduced scene; returns the summary."""
     check(scene, engines)
     if needs_run_in_time(scene):
-        return save_choices([scene], engines, folder, progress)
-    progress("screening", 0.1)
+        return save_choices([scene], engines, output_folder, report_progress)
+    report_progress("screening", 0.1)
     with scene_errors(scene):
         chooser = Chooser.from_scene(scene)
         choice = chooser.choose()
-        progress("single effects", 0.7)
+        report_progress("single effects", 0.7)
         further = chooser.change_if_left_out_too(frozenset(choice.left_out))
         single_effects = [_single_effect(chooser, effect) for effect in chooser.effects]
         activities = activity_by_element(chooser.full_scenes[len(chooser.full_scenes) // 2])
     if choice.left_out:
-        write(chooser.reduced_scene_without(frozenset(choice.left_out)), folder)
-    progress("what is left", 0.9)
+        write(chooser.reduced_scene_without(frozenset(choice.left_out)), output_folder)
+    report_progress("what is left", 0.9)
     results = _deviation_results(scene, chooser.reduced_scene_without(frozenset(choice.left_out)))
-    _save_effect_table(scene, single_effects, choice, activities, (results, chooser.counts), folder)
-    choice_figure(scene, single_effects, choice, activities, results, folder / "choice.png")
+    _save_effect_table(scene, single_effects, choice, activities, (results, chooser.counts), output_folder)
+    choice_figure(scene, single_effects, choice, activities, results, output_folder / "choice.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "results": results,
         "answer": _summary_of_choice(scene, choice, further),
@@ -141,7 +143,7 @@ def _save_effect_table(
     choice: RideChoice,
     activities: dict[str, float],
     runs: tuple[dict[str, Result], dict[str, int]],
-    folder: Path,
+    output_folder: Path,
 ) -> None:
     """Save, as netCDF and CSV, each effect's predicted and confirmed changes if only it is left out, and whether it was
     left out; and as another CSV file the energy activity (W) of every element."""
@@ -169,16 +171,18 @@ def _save_effect_table(
         engine="reference",
         counts={"confirmations": choice.confirmations} | counts,
     )
-    derived_result(saved, results, "deviations of the whole scene and of what is left").save(folder / "choice.nc")
+    derived_result(saved, results, "deviations of the whole scene and of what is left").save(
+        output_folder / "choice.nc"
+    )
     columns |= {
         f"{name}, {stage} [-]": values[:, i]
         for i, name in enumerate(scene.quantities)
         for stage, values in changes.items()
     }
     table = pd.DataFrame(columns | {"not alone because": why}, pd.Index(effects, name="effect"))
-    write_whole(folder / "effects.csv", table.to_csv(na_rep="nan"))
+    write_whole(output_folder / "effects.csv", table.to_csv(na_rep="nan"))
     activity_column = saved.data["activity"].to_pandas().rename("activity [W]")
-    write_whole(folder / "activity.csv", activity_column.to_csv(na_rep="nan"))
+    write_whole(output_folder / "activity.csv", activity_column.to_csv(na_rep="nan"))
 
 
 def choice_figure(

@@ -26,7 +26,7 @@ from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
 
 SYSTEM = "ride"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 ROADS_BY_KNOWLEDGE = {
     "one track": ("equal", "delayed"),
     "two tracks, axles independent": ("modelled", "uncorrelated"),
@@ -62,7 +62,9 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
             raise InputError(scene.file, key_path, name, "has no output of the same name as the scene's vehicle")
 
 
-def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: RideScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compare vehicle and road models with the scene's; saves ``errors.nc`` and ``.csv``, and a figure; returns the
     summary."""
     from studies.ride_figures import Heading, detail_figure
@@ -71,7 +73,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     full, plain = vehicle_of(scene), scene.model_copy(update={"weighting": {}})
     models, results = _vehicles_by_name([*_simpler_vehicles(scene), full]), dict[str, Result]()
     for i, (name, vehicle) in enumerate(models.items()):
-        progress(name, i / len(models))
+        report_progress(name, i / len(models))
         roads = {road: ROADS_BY_KNOWLEDGE[road] for road in _road_names(vehicle)}
         points = SweepPoints(correlations=roads)
         results[name] = run_scene(plain, "reference", vehicle=vehicle, points=points, error=scene.error)
@@ -84,9 +86,9 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         for i, road in enumerate(sweep.cases)
     }
     costs = _computing_times(scene, models)
-    _save_errors(scene, errors, names, results, folder)
+    _save_errors(scene, errors, names, results, output_folder)
     middle = {name: float(np.median(seconds)) for name, seconds in costs.items()}
-    detail_figure(errors, names, middle, Heading(scene.title, results), folder / "detail.png")
+    detail_figure(errors, names, middle, Heading(scene.title, results), output_folder / "detail.png")
     answer = {
         f"{model}, {road}": {
             name: None if np.isnan(value) else float(value) for name, value in zip(names, values, strict=True)
@@ -95,7 +97,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     }
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "results": results,
         "answer": answer,
@@ -145,7 +147,7 @@ def _computing_times(scene: RideScene, vehicle_models: dict[str, SpatialVehicle]
 
 
 def _save_errors(
-    scene: RideScene, errors: Errors, names: list[str], results: Mapping[str, Result], folder: Path
+    scene: RideScene, errors: Errors, names: list[str], results: Mapping[str, Result], output_folder: Path
 ) -> None:
     """Save relative errors: a row per output, a column per vehicle and road model; empty if a vehicle lacks the
     output."""
@@ -156,9 +158,9 @@ def _save_errors(
         {"output": Channel("output", names), "model": Channel("model", heads)},
         engine="reference",
     )
-    derived_result(saved, results, "the deviations of which they are ratios").save(folder / "errors.nc")
+    derived_result(saved, results, "the deviations of which they are ratios").save(output_folder / "errors.nc")
     table = saved.data["error"].to_pandas().rename(columns=lambda head: f"{head} [-]")
-    write_whole(folder / "errors.csv", table.to_csv())
+    write_whole(output_folder / "errors.csv", table.to_csv())
 
 
 def _table_lines(errors: Errors, computing_times: dict[str, list[float]], full_vehicle: SpatialVehicle) -> list[str]:

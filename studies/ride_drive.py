@@ -16,7 +16,7 @@ from models.systems.ride.readings import quasi_stationary_gaps
 from models.systems.ride.scene import RideScene
 
 SYSTEM = "ride"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 class Options(Strict):
@@ -41,24 +41,28 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
             raise InputError(scene.file, f"options.outputs.{i}", name, "is no output of the vehicle", names)
 
 
-def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: RideScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute standard deviations along the drive with the linear vehicle of the first engine; saves ``drive.nc`` and a
     figure, and returns the summary."""
     from studies.ride_figures import Heading, drive_figure
 
     check(scene, engines)
     vehicle, engine = vehicle_of(scene), engines[0]
-    progress(f"drive, linear vehicle of {engine}, and each speed by itself", 0.1)
+    report_progress(f"drive, linear vehicle of {engine}, and each speed by itself", 0.1)
     result = run_scene(scene, engine, error=scene.error)
-    result.save(folder / "drive.nc")
+    result.save(output_folder / "drive.nc")
     drive, quasi_stationary, units = result.detail, result["quasi_stationary"], result["unit"].tolist()
     kinds = {output.name: (output.kind, unit) for output, unit in zip(vehicle.outputs, units, strict=False)}
     shown = [name for name, (kind, _) in kinds.items() if kind in ("acceleration", "tyre force")]
     shown = _options(scene).outputs or shown or list(kinds)
-    drive_figure(drive, quasi_stationary, shown, kinds, Heading(scene.title, {engine: result}), folder / "drive.png")
+    drive_figure(
+        drive, quasi_stationary, shown, kinds, Heading(scene.title, {engine: result}), output_folder / "drive.png"
+    )
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "results": {engine: result},
         "answer": _summary_of_drive(drive, quasi_stationary),

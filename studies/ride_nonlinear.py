@@ -23,7 +23,7 @@ from models.vehicles.spatial import SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import preloads, wheels
 
 SYSTEM = "ride"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 class Options(Sampling):
@@ -50,7 +50,9 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
         raise InputError(scene.file, "options.skipped", options.skipped, allowed)
 
 
-def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: RideScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute standard deviations over speed by statistical linearisation, Monte Carlo copies and engines' runs; saves
     ``nonlinear.nc`` and two figures, and returns the summary."""
     from studies.ride_figures import Heading, engine_spectra_figure, nonlinear_figure
@@ -59,11 +61,13 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     assert scene.speeds is not None
     options, vehicle = _options(scene), vehicle_of(scene)
     speed, road = options.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
-    results = {"reference": run_scene(scene, "reference", sampling=options, progress=progress, error=scene.error)}
-    results["reference"].save(folder / "nonlinear.nc")
+    results = {
+        "reference": run_scene(scene, "reference", sampling=options, progress=report_progress, error=scene.error)
+    }
+    results["reference"].save(output_folder / "nonlinear.nc")
     answer, runs, failed = results["reference"].detail, dict[str, Ride](), dict[str, str]()
     for engine in (engine for engine in engines if engine in INTEGRATORS):
-        progress(f"{engine} in time", 0.8)
+        report_progress(f"{engine} in time", 0.8)
         try:
             results[engine] = run_scene(scene, engine, sampling=options, error=scene.error)
         except RunFailed as error:
@@ -71,12 +75,12 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
             continue
         runs[engine] = results[engine].detail
     top = Heading(scene.title, results)
-    nonlinear_figure(answer, top, folder / "deviations.png")
+    nonlinear_figure(answer, top, output_folder / "deviations.png")
     if runs:
-        engine_spectra_figure(runs, answer.shown.vehicle, road, speed, top, folder / "spectra.png")
+        engine_spectra_figure(runs, answer.shown.vehicle, road, speed, top, output_folder / "spectra.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": failed,
         "results": results,
         "answer": _summary_of_deviations(answer),

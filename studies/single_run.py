@@ -15,33 +15,33 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene
 from models.vehicles.pitch_plane import STATE_NAMES
 
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
-def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress) -> dict[str, Any]:
     """Run the scene in each engine; saves ``ENGINE.nc`` and ``states.png``, and returns the summary. A failed run is
     reported, and the others are run."""
     results: dict[str, Result] = {}
     failed: dict[str, str] = {}
     for i, engine in enumerate(engines):
-        progress(f"{scene.title}: {engine}", i / len(engines))
+        report_progress(f"{scene.title}: {engine}", i / len(engines))
         try:
             results[engine] = simulate(scene, engine, error=scene.error)
         except RunFailed as error:
             failed[engine] = str(error)
             continue
-        results[engine].save(folder / f"{engine}.nc")
-    progress("figure", 1.0)
+        results[engine].save(output_folder / f"{engine}.nc")
+    report_progress("figure", 1.0)
     assembly = assembly_of_scene(scene)
     if results:
-        _figure(scene, results, folder / "states.png")
+        _figure(scene, results, output_folder / "states.png")
     texts = {engine: result.data.attrs.get("beside reference") for engine, result in results.items()}
     outside_engines = [
         f"  {engine}: {text}" for engine, text in texts.items() if text
     ]  # of engines from outside the tree
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "runs": {engine: _run_summary(result) for engine, result in results.items()},
         "failed": failed,
         "results": results,

@@ -13,18 +13,20 @@ from models.systems.single_track.run import run as run_scene
 from models.systems.single_track.scene import SingleTrackScene
 
 SYSTEM = "single-track"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 SHOWN_CHANNELS = {"yaw rate": "rad/s", "lateral acceleration": "m/s²", "side slip": "rad"}
 PANEL_TITLES = {"wheels steer": "Steer angle of the wheels"}
 """Titles of panels for channels whose names are no titles."""
 
 
-def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: SingleTrackScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Run the car along the drive; saves ``drive.nc`` and ``drive.png``, and returns the summary."""
-    progress("the drive", 0.0)
+    report_progress("the drive", 0.0)
     driven = run_scene(scene, error=scene.error)
-    driven.save(folder / "drive.nc")
-    figure(driven, measured_channels(scene, driven), scene.title, folder / "drive.png")
+    driven.save(output_folder / "drive.nc")
+    figure(driven, measured_channels(scene, driven), scene.title, output_folder / "drive.png")
     answer = {
         f"rms of {name} [{unit}]": float(np.sqrt(np.mean(driven[name] ** 2))) for name, unit in SHOWN_CHANNELS.items()
     }
@@ -33,7 +35,7 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     }
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "answer": answer,
         "results": {"drive": driven},

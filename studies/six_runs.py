@@ -24,41 +24,41 @@ from models.systems.pitch_plane.six_runs import (
     options_of,
 )
 
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 SAVED_SPACING = 0.01
 """Row spacing (s) of the saved runs; the table is computed from every step."""
 check = options_of
 
 
-def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress) -> dict[str, Any]:
     """Run all six runs in each engine; saves every result, five figures and ``table.txt``, and returns the summary."""
     options = check(scene, engines)
-    measured, deviation, scenes = measurement_and_runs(scene, folder, scene.error)
-    measured.save(folder / "measurement.nc")
+    measured, deviation, scenes = measurement_and_runs(scene, output_folder, scene.error)
+    measured.save(output_folder / "measurement.nc")
     runs: dict[str, dict[str, Result]] = {engine: {} for engine in engines}
     failed: dict[str, str] = {}
     pairs = [(engine, name) for engine in engines for name in scenes]
     for i, (engine, name) in enumerate(pairs):
-        progress(f"{engine}: {name}", i / len(pairs))
+        report_progress(f"{engine}: {name}", i / len(pairs))
         try:
             runs[engine][name] = run_with_drift(scenes[name], engine, scene.error)
         except RunFailed as failure:
             failed[f"{engine}, {name}"] = str(failure)
             continue
-        runs[engine][name].every(SAVED_SPACING).save(folder / f"{engine} {name}.nc")
+        runs[engine][name].every(SAVED_SPACING).save(output_folder / f"{engine} {name}.nc")
     rows = [
         figures_of_run(engine, name, measured, result) for engine in engines for name, result in runs[engine].items()
     ]
     table = summary_lines(rows, engines, options, deviation)
-    write_whole(folder / "table.txt", "\n".join(table) + "\n")
-    progress("figures", 1.0)
+    write_whole(output_folder / "table.txt", "\n".join(table) + "\n")
+    report_progress("figures", 1.0)
     if not failed:
-        _draw_figures(measured, runs[engines[0]], folder)
+        _draw_figures(measured, runs[engines[0]], output_folder)
     results_by_name = {f"{engine}: {name}": result for engine in engines for name, result in runs[engine].items()}
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "results": {"measurement": measured, **results_by_name},
         "sampling rate": options.sampling_rate,
         "noise deviation": deviation,
@@ -110,11 +110,11 @@ def summary_lines(
     ]
 
 
-def _draw_figures(measured_run: Result, runs: dict[str, Result], folder: Path) -> None:
+def _draw_figures(measured_run: Result, runs: dict[str, Result], output_folder: Path) -> None:
     """Save figures like Figs 4 to 8 of the paper."""
     from models.drawing.figures import save
 
-    save(_figure_measurement(measured_run), folder / "fig4_measurement.png")
+    save(_figure_measurement(measured_run), output_folder / "fig4_measurement.png")
     main = {
         "virtual measurement": measured_run,
         "undisturbed": runs["undisturbed"],
@@ -122,7 +122,7 @@ def _draw_figures(measured_run: Result, runs: dict[str, Result], folder: Path) -
         "perturbed model": runs["perturbed"],
         "both": runs["both"],
     }
-    save(_figure_drift(main, "Force-excited runs beside the measurement"), folder / "fig5_drift.png")
+    save(_figure_drift(main, "Force-excited runs beside the measurement"), output_folder / "fig5_drift.png")
     for prefix, title, name in (
         ("noisy", "noise samples", "fig6_noise_samples"),
         ("model", "perturbed models", "fig7_perturbed_models"),
@@ -132,8 +132,8 @@ def _draw_figures(measured_run: Result, runs: dict[str, Result], folder: Path) -
         }
         if len(chosen) == 1:
             continue
-        save(_figure_drift(chosen, f"Force-excited runs: {len(chosen) - 1} {title}"), folder / f"{name}.png")
-    save(_figure_moment(runs["guided, both"]), folder / "fig8_enforced_moment.png")
+        save(_figure_drift(chosen, f"Force-excited runs: {len(chosen) - 1} {title}"), output_folder / f"{name}.png")
+    save(_figure_moment(runs["guided, both"]), output_folder / "fig8_enforced_moment.png")
 
 
 def _figure_measurement(measured_run: Result) -> Any:

@@ -18,37 +18,37 @@ from models.fatigue.damage import COUNTING_CONVENTION
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.stabilised import Bench, Options, Row, compare, options_of
 
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 check = options_of
 
 
-def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress) -> dict[str, Any]:
     """Run all methods on both roads; saves every road's files, ``score.csv``, ``score.nc``, ``table.txt`` and two
     figures, and returns the summary."""
     from models.drawing.drift import decision_figure, stiffness_figure
     from models.drawing.figures import save
 
-    benches_of_roads, rows, failed = compare(scene, engines, folder, progress)
+    benches_of_roads, rows, failed = compare(scene, engines, output_folder, report_progress)
     options = benches_of_roads[0].options
-    progress("sweep of stiffness and cut-off", len(benches_of_roads) / (len(benches_of_roads) + 1))
+    report_progress("sweep of stiffness and cut-off", len(benches_of_roads) / (len(benches_of_roads) + 1))
     sweep = {bench.road: bench.sweep() for bench in benches_of_roads}
     table = summary_lines(rows, benches_of_roads, options)
-    write_whole(folder / "table.txt", "\n".join(table) + "\n")
-    with whole_file(folder / "score.csv") as partial_path, partial_path.open("w", newline="") as file:
+    write_whole(output_folder / "table.txt", "\n".join(table) + "\n")
+    with whole_file(output_folder / "score.csv") as partial_path, partial_path.open("w", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
     results = {name: result for bench in benches_of_roads for name, result in bench.results.items()}
     saved = result_from_table(scene, rows, "run")
     saved.data.attrs["error"] = _step_error_text(benches_of_roads[0].results)
-    saved.save(folder / "score.nc")
-    progress("figures", 1.0)
+    saved.save(output_folder / "score.nc")
+    report_progress("figures", 1.0)
     of_first = [row for row in rows if row["engine"] == engines[0]]
-    save(decision_figure(of_first, options.limits, options.grade, results), folder / "decide.png")
-    save(stiffness_figure(sweep, benches_of_roads[0], options.limits, options.grade), folder / "stiffness.png")
+    save(decision_figure(of_first, options.limits, options.grade, results), output_folder / "decide.png")
+    save(stiffness_figure(sweep, benches_of_roads[0], options.limits, options.grade), output_folder / "stiffness.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "rows": rows,
         "failed": failed,
         "results": results,

@@ -46,7 +46,7 @@ from models.systems.pitch_plane.virtual_measurement import (
     write_measurement,
 )
 
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 Row = dict[str, Any]
 ROW_SPACING = 0.1
 """Row spacing (s) of the noise paths in the figure."""
@@ -66,14 +66,14 @@ class Options(Strict):
     seed: int = Field(1, ge=0, lt=2**63, description="seed of the noise")
 
 
-def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress) -> dict[str, Any]:
     """Predict the growth of errors, and measure it by an ensemble and two runs in the first engine; saves
     ``table.txt``, ``trust.nc`` and a figure, and returns the summary."""
     options = check(scene, engines)
-    base, measured, largest = _scene_under_forces(scene, options, folder)
+    base, measured, largest = _scene_under_forces(scene, options, output_folder)
     deviation, assembly = options.noise_fraction * largest, assembly_of_scene(base)
     other_parameters = assembly.parameters.model_copy(update={"I": assembly.parameters.I * (1 - options.inertia_error)})
-    progress("predictions", 0.1)
+    report_progress("predictions", 0.1)
     curves = {
         "noise": noise_error_curve(assembly, deviation),
         "interpolation": interpolation_error_curve(assembly),
@@ -82,7 +82,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     }
     runs = {}
     if measured is not None:
-        progress("runs", 0.2)
+        report_progress("runs", 0.2)
         clean = run_with_drift(base, engines[0])
         wrong = run_with_drift(
             changed_scene(base, vehicle={"override": {**base.vehicle.override, "I": other_parameters.I}}), engines[0]
@@ -91,18 +91,18 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
             "interpolation": _pitch_difference(clean, measured["pitch"]),
             "inertia": _pitch_difference(wrong, clean["pitch"]),
         }
-    progress("noise paths", 0.4)
+    report_progress("noise paths", 0.4)
     quiet = run_with_drift(base, "reference", scene.error)
     spread = _ensemble_of_paths(base, quiet, deviation, options, engines[0], Crew.of(scene, default_workers=1))
     rows = _drift_off_rows(curves, runs, spread, options)
     table = _table_lines(rows, options, deviation, pitch_error_growth(assembly).rate, base, curves)
-    write_whole(folder / "table.txt", "\n".join(table) + "\n")
+    write_whole(output_folder / "table.txt", "\n".join(table) + "\n")
     saved = _with_errors(_saved_paths(scene, rows, spread), quiet, spread, options)
-    saved.save(folder / "trust.nc")
+    saved.save(output_folder / "trust.nc")
     results = {"forces without noise": quiet, "growth": saved} | ({} if measured is None else {"measurement": measured})
-    progress("figure", 0.9)
-    _figure(curves, runs, spread, options, results, folder / "error_growth.png")
-    summary = {"scene": scene.title, "folder": str(folder), "rows": rows, "failed": {}, "table": table}
+    report_progress("figure", 0.9)
+    _figure(curves, runs, spread, options, results, output_folder / "error_growth.png")
+    summary = {"scene": scene.title, "folder": str(output_folder), "rows": rows, "failed": {}, "table": table}
     return summary | {"results": results}
 
 
@@ -124,15 +124,15 @@ def check(scene: Scene, engines: tuple[str, ...]) -> Options:
     return options
 
 
-def _scene_under_forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, Result | None, float]:
+def _scene_under_forces(scene: Scene, options: Options, output_folder: Path) -> tuple[Scene, Result | None, float]:
     """The scene under wheel forces; the run on the road that gave the forces, None if they are from a file; and the
     largest force (N)."""
     if "road" not in scene.effects:
         return scene, None, float(np.abs(assembly_of_scene(scene).input.values).max())  # type: ignore[union-attr]
     assert options.sampling_rate is not None
     measured = measure(scene, scene.error)
-    largest = write_measurement(measured, folder, 1.0 / options.sampling_rate)
-    return follower_builder(scene, folder)({}, {}), measured, largest
+    largest = write_measurement(measured, output_folder, 1.0 / options.sampling_rate)
+    return follower_builder(scene, output_folder)({}, {}), measured, largest
 
 
 def _pitch_difference(run: Result, undisturbed_pitch: np.ndarray) -> GrowthCurve:

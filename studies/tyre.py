@@ -20,7 +20,7 @@ from models.tyre.assumptions import assumptions
 from models.tyre.tyre_table import TyreTable
 
 SYSTEM = "braking"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 class Options(Strict):
@@ -39,7 +39,9 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     tyre_tables_of(scene)
 
 
-def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: BrakingScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Tabulate every tyre of the scene; saves ``tyre.png``, and for each tyre a netCDF and a CSV file that can be read
     as a tyre again; returns the summary."""
     from studies.tyre_figure import tyre_figure
@@ -48,13 +50,13 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     tables = tyre_tables_of(scene)
     answer = {name: table.characteristic_values(options.load) for name, table in tables.items()}
     results = {
-        name: save(scene, table, options, folder / f"{name.replace('/', '_').replace(' ', '_')}.csv")
+        name: save(scene, table, options, output_folder / f"{name.replace('/', '_').replace(' ', '_')}.csv")
         for name, table in tables.items()
     }
-    tyre_figure(tables, (options.slip_angles, options.load), scene.title, folder / "tyre.png", results)
+    tyre_figure(tables, (options.slip_angles, options.load), scene.title, output_folder / "tyre.png", results)
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "answer": answer,
         "results": results,

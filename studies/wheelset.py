@@ -23,12 +23,14 @@ from models.systems.wheelset.run import run as run_path
 from models.systems.wheelset.scene import WheelsetScene
 
 SYSTEM = "wheelset"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 Paths = dict[str, dict[float, Result]]
 """Result of each run, by engine and speed (m/s)."""
 
 
-def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: WheelsetScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute eigenvalues over speed, and runs at the scene's speeds; saves ``eigenvalues.nc``, ``paths.nc``,
     ``over_speed.csv`` and figures, and returns the summary."""
     from studies.wheelset_figures import creep_figure, paths_figure, stability_figure
@@ -37,26 +39,26 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     conicities = conicity.run(scene) if conicity.reports_conicity(scene) else None
     for i, engine in enumerate(engines):
         try:
-            progress(f"eigenvalues of {engine}", i / len(engines))
+            report_progress(f"eigenvalues of {engine}", i / len(engines))
             eigenvalues[engine] = linearised_result(scene, engine, error=scene.error)
-            progress(f"paths of {engine}", (i + 0.5) / len(engines))
+            report_progress(f"paths of {engine}", (i + 0.5) / len(engines))
             paths[engine] = {speed: run_path(scene, engine, speed, error=scene.error) for speed in path_speeds(scene)}
         except RunFailed as error:
             failed[engine] = str(error)
     linear = {engine: result.detail for engine, result in eigenvalues.items()}
     if linear:
-        joined_result(join_results(eigenvalues, "engine"), eigenvalues).save(folder / "eigenvalues.nc")
-        _save_table(linear, folder)
-        stability_figure(eigenvalues, wheelset, scene.title, folder / "stability.png")
+        joined_result(join_results(eigenvalues, "engine"), eigenvalues).save(output_folder / "eigenvalues.nc")
+        _save_table(linear, output_folder)
+        stability_figure(eigenvalues, wheelset, scene.title, output_folder / "stability.png")
     if paths:
-        over_speeds(paths).save(folder / "paths.nc")
-        paths_figure(paths, scene.title, folder / "paths.png")
-        creep_figure(next(iter(paths.values())), scene.title, folder / "creep.png")
+        over_speeds(paths).save(output_folder / "paths.nc")
+        paths_figure(paths, scene.title, output_folder / "paths.png")
+        creep_figure(next(iter(paths.values())), scene.title, output_folder / "creep.png")
     if conicities:
-        conicities.save(folder / "conicity.nc")
+        conicities.save(output_folder / "conicity.nc")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": failed,
         "answer": _summary_of_paths(wheelset, linear, paths)
         | (conicity.conicity_numbers(conicities) if conicities else {}),
@@ -83,14 +85,14 @@ def _results_by_name(paths: Paths) -> dict[str, Result]:
     }
 
 
-def _save_table(linear_results: dict[str, LinearisedMotion], folder: Path) -> None:
+def _save_table(linear_results: dict[str, LinearisedMotion], output_folder: Path) -> None:
     """Save a CSV table of growth rate (1/s), and damping and frequency of hunting, over speed."""
     columns = {"speed": ("m/s", next(iter(linear_results.values())).speeds)}
     for engine, linear_run in linear_results.items():
         columns[f"{engine} growth"] = ("1/s", linear_run.values.real.max(axis=1))
         columns[f"{engine} hunting damping"] = ("1/s", -linear_run.hunting.real)
         columns[f"{engine} hunting frequency"] = ("Hz", linear_run.hunting.imag / (2.0 * np.pi))
-    write_table(folder / "over_speed.csv", columns)
+    write_table(output_folder / "over_speed.csv", columns)
 
 
 def _summary_of_paths(wheelset: Wheelset, linear_results: dict[str, LinearisedMotion], paths: Paths) -> dict[str, Any]:

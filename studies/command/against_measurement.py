@@ -258,13 +258,15 @@ def saved_results(file_or_folder: Path) -> dict[str, Result]:
     return {file.stem: load(file) for file in files}
 
 
-def report(run_path: Path, measurement: Path, folder: Path, time_shift_seconds: float | None = None) -> dict[str, Any]:
+def report(
+    run_path: Path, measurement: Path, output_folder: Path, time_shift_seconds: float | None = None
+) -> dict[str, Any]:
     """Compare a measurement with a run, or with all runs in a folder; saves ``compare.csv`` and figures, and returns
     the summary."""
     overlays = {
         name: overlay_of_run(run, measurement, time_shift_seconds) for name, run in saved_results(run_path).items()
     }
-    with whole_file(folder / "compare.csv") as partial_path, partial_path.open("w", newline="") as file:
+    with whole_file(output_folder / "compare.csv") as partial_path, partial_path.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(("run", *TABLE_HEADINGS))
         for name, overlay in overlays.items():
@@ -274,12 +276,12 @@ def report(run_path: Path, measurement: Path, folder: Path, time_shift_seconds: 
         draw_overlay(
             overlay,
             f"{measurement.name} over {name}",
-            folder / (f"compare_{name}.png" if len(overlays) > 1 else "compare.png"),
+            output_folder / (f"compare_{name}.png" if len(overlays) > 1 else "compare.png"),
         )
     table = [line for name, overlay in overlays.items() for line in _overlay_lines(name, overlay, len(overlays))]
     return {
         "scene": f"{measurement} over {run_path}",
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "shift": {name: overlay.shift.seconds for name, overlay in overlays.items()},
         "errors of channels": {

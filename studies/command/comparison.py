@@ -100,18 +100,18 @@ def _file_pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]
     )
 
 
-def _result_files(folder: Path) -> dict[str, Path]:
+def _result_files(results_folder: Path) -> dict[str, Path]:
     """Result files of a folder by name: netCDF files, except for those whose table is in a CSV file, too; the CSV files
     if there are no such netCDF files."""
     files = [
         path
-        for path in sorted(folder.rglob("*"))
+        for path in sorted(results_folder.rglob("*"))
         if path.suffix in RESULT_SUFFIXES
-        and not any(folder_name.startswith(".") for folder_name in path.relative_to(folder).parts)
+        and not any(folder_name.startswith(".") for folder_name in path.relative_to(results_folder).parts)
     ]
     netcdf = [path for path in files if path.suffix == ".nc" and not _holds_same_table(path)]
     chosen = netcdf or [path for path in files if path.suffix == ".csv"]
-    return {path.relative_to(folder).as_posix(): path for path in chosen}
+    return {path.relative_to(results_folder).as_posix(): path for path in chosen}
 
 
 def _holds_same_table(path: Path) -> bool:
@@ -310,10 +310,10 @@ def _common_extent(common_times: np.ndarray, *grids: np.ndarray) -> str:
     return f"; only from {first:g} to {last:g} s, the part that both runs have of {begin:g} to {end:g} s"
 
 
-def report(first_path: Path, second_path: Path, folder: Path) -> dict[str, Any]:
+def report(first_path: Path, second_path: Path, output_folder: Path) -> dict[str, Any]:
     """Compare two results; saves ``compare.csv`` and ``compare.png``, and returns the summary."""
     differences, notes = compare(first_path, second_path)
-    with whole_file(folder / "compare.csv") as partial_path, partial_path.open("w", newline="") as file:
+    with whole_file(output_folder / "compare.csv") as partial_path, partial_path.open("w", newline="") as file:
         writer = csv.writer(file)
         heads = ("quantity", "unit", "largest difference", "at", "rms difference", "share of largest value")
         writer.writerow((*heads, "stated error of both"))
@@ -322,10 +322,10 @@ def report(first_path: Path, second_path: Path, folder: Path) -> dict[str, Any]:
             for d in differences
         )
     results = results_of(first_path, second_path)
-    _figure(first_path, second_path, differences, results, folder / "compare.png")
+    _figure(first_path, second_path, differences, results, output_folder / "compare.png")
     return {
         "scene": f"{second_path} less {first_path}",
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "names": [difference.name for difference in differences],
         "differences": {

@@ -36,13 +36,13 @@ def profiled_work(profile: bool) -> Callable[[StudyRun], StudyRun]:
 
 def finish(
     work: StudyRun,
-    folder: Path,
+    output_folder: Path,
     as_json: bool,
     doubts: tuple[Finding, ...] = (),
     strict: bool = False,
     system: str = "",
 ) -> None:
-    """Run a study, whose results are saved in ``folder``, with a progress bar, and print its summary.
+    """Run a study, whose results are saved in ``output_folder``, with a progress bar, and print its summary.
 
     doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results; strict : whether
     a broken assumption ends with code 1; system : of the scene.
@@ -51,18 +51,17 @@ def finish(
     from models.core.told import summary_with_errors
 
     try:
-        with progress_bar(folder.name, system) as progress:
+        with progress_bar(output_folder.name, system) as progress:
             summary = summary_with_errors(work(progress))
         if doubts:
             summary["queries"] = findings_as_dicts(doubts)
-            write_whole(folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
+            write_whole(output_folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
     except KeyboardInterrupt:
-        has_results = {path.name for path in folder.iterdir()} - {COMMAND_FILE}
-        exit_with_message(
-            f"interrupted; {f'finished results are kept in {folder}' if has_results else 'nothing was finished'}", 130
-        )
+        has_results = {path.name for path in output_folder.iterdir()} - {COMMAND_FILE}
+        outcome = f"finished results are kept in {output_folder}" if has_results else "nothing was finished"
+        exit_with_message(f"interrupted; {outcome}", 130)
     finally:
-        drop_if_empty(folder)
+        drop_if_empty(output_folder)
     if as_json:
         print(json.dumps(summary, indent=1))
     else:

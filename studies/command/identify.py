@@ -34,7 +34,7 @@ def identify(
     *,
     engine: str = "",
     low_pass: float = 0.0,
-    folder: Path | None = None,
+    stages_folder: Path | None = None,
     report_progress: ReportProgress = lambda text, share: None,
 ) -> Uncertainty:
     """Estimates of a scene's keys from a measurement, with their uncertainty; the run must have channels over time.
@@ -45,9 +45,9 @@ def identify(
     """
     problem = problem_of(scene, measurement, parameters, engine, low_pass)
     with Crew.of(scene, default_workers=1).at_work(1 + len(problem.parameters), *folders_for_workers(scene)) as pool:
-        if folder is None:
+        if stages_folder is None:
             return uncertainty(fit(problem, None, report_progress, executor=pool), pool)
-        store = Store(folder / STAGES_FOLDER)
+        store = Store(stages_folder / STAGES_FOLDER)
         with store.reserved_folder(_facts_of_stages(scene, measurement, problem, engine, low_pass)):
             return uncertainty(fit(problem, store, report_progress, executor=pool), pool)
 
@@ -95,21 +95,23 @@ def report(
     scene: Any,
     measurement: Path,
     parameters: Sequence[str],
-    folder: Path,
+    output_folder: Path,
     report_progress: ReportProgress,
     all_profiles: bool,
     **identify_options: Any,
 ) -> dict[str, Any]:
     """Identify parameters; saves ``identify.json`` and ``identify.png``, and returns the summary. all_profiles :
     likelihood profiles of all parameters, not only of undetermined ones."""
-    known = identify(scene, measurement, parameters, folder=folder, report_progress=report_progress, **identify_options)
+    known = identify(
+        scene, measurement, parameters, stages_folder=output_folder, report_progress=report_progress, **identify_options
+    )
     drawn = list(profiles_of(scene, known, all_profiles, report_progress))
     answer = identification_record(known, drawn)
-    write_whole(folder / "identify.json", json.dumps(answer, indent=1) + "\n")
-    draw_fit(known, f"{measurement.name} by {scene.title}", folder / "identify.png")
+    write_whole(output_folder / "identify.json", json.dumps(answer, indent=1) + "\n")
+    draw_fit(known, f"{measurement.name} by {scene.title}", output_folder / "identify.png")
     return {
         "scene": f"{scene.title}, identified from {measurement}",
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "identified": answer,
         "table": identification_lines(known, drawn),

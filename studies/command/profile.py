@@ -64,9 +64,9 @@ class Profiler:
             self.seconds[OTHER_KIND if frame is None else kind_of_work(frame)] += current_time - last_time
             last_time = current_time
 
-    def run_profiled(self, work: Callable[[Any], dict[str, Any]], progress: Any) -> dict[str, Any]:
+    def run_profiled(self, work: Callable[[Any], dict[str, Any]], report_progress: Any) -> dict[str, Any]:
         """Run a study, stop the profiler, and return the study's summary with the profile's lines."""
-        summary = work(progress)
+        summary = work(report_progress)
         self._over.set()
         self._thread.join()
         spent: dict[str, float] = dict(sorted(self.seconds.items(), key=lambda part_and_seconds: -part_and_seconds[1]))

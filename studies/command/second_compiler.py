@@ -64,12 +64,11 @@ def second_process_compiles(name: str, changes: list[str], scene: Any, engines: 
             compiler.end()
 
 
-def run_for_kernels(name: str, changes: list[str], engine: str, error: bool, folder: str) -> None:
-    """Run a scene in one engine, which compiles its kernels; results are saved in ``folder``. The scene is checked by
-    the first process.
-    """
+def run_for_kernels(name: str, changes: list[str], engine: str, error: bool, output_folder: str) -> None:
+    """Run a scene in one engine, which compiles its kernels; results are saved in ``output_folder``. The scene is
+    checked by the first process."""
     scene = load_scene(name, changes).model_copy(update={"error": error})
-    study_of(scene).run(scene, (engine,), Path(folder), lambda text, share: None)
+    study_of(scene).run(scene, (engine,), Path(output_folder), lambda text, share: None)
 
 
 if __name__ == "__main__":

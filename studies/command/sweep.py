@@ -122,15 +122,15 @@ def _failed_record(reason: object) -> Record:
 
 
 @contextmanager
-def complete_folder(folder: Path) -> Iterator[Path]:
+def complete_folder(final_folder: Path) -> Iterator[Path]:
     """Context that yields a temporary folder to write into. It gets its final name only when it is complete, and then
     replaces an older folder of this name."""
-    partial_folder = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+    partial_folder = final_folder.with_name(f".{final_folder.name}.{os.getpid()}.part")
     partial_folder.mkdir(parents=True)
     try:
         yield partial_folder
-        shutil.rmtree(folder, ignore_errors=True)
-        os.replace(partial_folder, folder)
+        shutil.rmtree(final_folder, ignore_errors=True)
+        os.replace(partial_folder, final_folder)
     finally:
         shutil.rmtree(partial_folder, ignore_errors=True)
 
@@ -202,14 +202,14 @@ def _is_writable(summary_value: Any) -> bool:
         return False
 
 
-def run(job: SweepJob, progress: Callable[[str, float], None], crew: Crew) -> dict[str, Any]:
+def run(job: SweepJob, report_progress: Callable[[str, float], None], crew: Crew) -> dict[str, Any]:
     """Run all unfinished points of a sweep by workers, then save its table and figures; returns the summary."""
     from studies.command.sweep_figure import draw_sweep  # workers, which import this file, draw nothing
 
     with exclusive_folder(job.folder):
         for partial_folder in (job.folder / RUNS_FOLDER).glob(".*.part"):
             shutil.rmtree(partial_folder, ignore_errors=True)  # of a process that was killed while it wrote
-        records = _records_of_points(job, progress, crew)
+        records = _records_of_points(job, report_progress, crew)
         swept = _sweep_columns(job, records)
         _save_sweep(job.folder, swept)
         pages = draw_sweep(swept, job.folder)
@@ -256,12 +256,12 @@ def _unit_of_key(job: SweepJob) -> str:
     return str(extra["unit"]) or "-" if isinstance(extra, dict) and "unit" in extra else "SI"
 
 
-def _records_of_points(job: SweepJob, progress: Callable[[str, float], None], crew: Crew) -> list[Record]:
+def _records_of_points(job: SweepJob, report_progress: Callable[[str, float], None], crew: Crew) -> list[Record]:
     """Records of all points of a sweep, computed by workers; raises InputError if no point failed but none has a number
     to show."""
 
     def tell(finished: Done) -> None:
-        progress(f"{finished.done} of {finished.paths} points", finished.done / finished.paths)
+        report_progress(f"{finished.done} of {finished.paths} points", finished.done / finished.paths)
 
     def lost(points: range, reason: str) -> Arrays:
         return _json_array(_failed_record(reason) for _ in points)
@@ -283,7 +283,7 @@ def _absolute_path(scene: str) -> str:
     return str(Path(scene).resolve()) if Path(scene).is_file() else scene
 
 
-def _save_sweep(folder: Path, sweep_results: "SweepResults") -> None:
+def _save_sweep(output_folder: Path, sweep_results: "SweepResults") -> None:
     """Save the results of a sweep as ``sweep.csv`` and ``sweep.json``; equal points give equal bytes."""
     errors, broken = (
         [_largest_error(results) for results in sweep_results.results],
@@ -300,7 +300,7 @@ def _save_sweep(folder: Path, sweep_results: "SweepResults") -> None:
         writer.writerow(
             [value, *(column[i] for column in sweep_results.columns.values()), failed, errors[i], broken[i]]
         )
-    write_whole(folder / "sweep.csv", text.getvalue().encode())
+    write_whole(output_folder / "sweep.csv", text.getvalue().encode())
     content = {
         "key": sweep_results.key,
         "values": list(sweep_results.values),
@@ -308,7 +308,7 @@ def _save_sweep(folder: Path, sweep_results: "SweepResults") -> None:
         "failed": sweep_results.failures,
     }
     content |= {"results": [told.errors_and_assumptions(results) for results in sweep_results.results]}
-    write_whole(folder / "sweep.json", json.dumps(content, indent=1).encode())
+    write_whole(output_folder / "sweep.json", json.dumps(content, indent=1).encode())
 
 
 def _largest_error(results: told.Results) -> float | None:

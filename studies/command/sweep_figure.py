@@ -84,7 +84,7 @@ def _results_of_engine(results: Results, engine: str) -> Results:
     return {name: run for name, run in results.items() if run.data.attrs["engine"] not in other_engines}
 
 
-def draw_sweep(sweep_results: SweepResults, folder: Path) -> list[str]:
+def draw_sweep(sweep_results: SweepResults, output_folder: Path) -> list[str]:
     """Save the figures ``sweep.png``, ``sweep-2.png``, ... of a sweep, and return their names; none if no number
     changes."""
     changing = _changing_quantities(sweep_results.columns)
@@ -93,7 +93,10 @@ def draw_sweep(sweep_results: SweepResults, folder: Path) -> list[str]:
     for first in range(0, len(shown), size):
         name = f"sweep-{first // size + 1}.png" if first else "sweep.png"
         _draw_page(
-            sweep_results, shown[first : first + size], folder / name, f"the {len(changing)} quantities that change"
+            sweep_results,
+            shown[first : first + size],
+            output_folder / name,
+            f"the {len(changing)} quantities that change",
         )
         names.append(name)
     return names

@@ -44,13 +44,13 @@ class PictureScene(SceneFile):
     film: Film
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> PictureScene:
+def build(scene_table: Mapping[str, Any], scene_file: str = "", scene_folder: Path = Path()) -> PictureScene:
     """Checked scene of pictures from nested tables; raises InputError for anything that is not understood."""
-    scene = checked(PictureScene, table, file, folder)
+    scene = checked(PictureScene, scene_table, scene_file, scene_folder)
     if scene.film.frames > MOST_FRAMES:
         allowed = (
             f"makes {scene.film.frames} frames (duration x slow motion x frames per second) where at most "
             f"{MOST_FRAMES} are drawn: show less of the run"
         )
-        raise InputError(file, "film.duration", scene.film.duration, allowed)
+        raise InputError(scene_file, "film.duration", scene.film.duration, allowed)
     return scene

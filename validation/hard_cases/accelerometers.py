@@ -43,7 +43,7 @@ BRACKET_SENSORS = {"battery": {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"freque
 
 
 def _readings_of_run(
-    engine: str,
+    engine_name: str,
     sensor_positions: dict[str, Any],
     extra: dict[str, Any] | None = None,
     noise: float = 0.0,
@@ -65,9 +65,9 @@ def _readings_of_run(
     assembly = (
         base if initial is None else driven_by_forces(base, Sampled(np.zeros((400, 2)), SAMPLE_PERIOD, held=True))
     )
-    engine_settings = settings(engine, SAMPLE_PERIOD, 0.3)
-    model = build(engine, assembly, engine_settings)
-    run = simulate(assembly.scene, engine, engine_settings, assembly)
+    engine_settings = settings(engine_name, SAMPLE_PERIOD, 0.3)
+    model = build(engine_name, assembly, engine_settings)
+    run = simulate(assembly.scene, engine_name, engine_settings, assembly)
     felt = readings_of(run, assembly.scene.effects["accelerometers"])
     true = np.array([model.acceleration(t, *np.split(y, 2))[3] for t, y in zip(run.times, run.states, strict=True)])
     return felt, run.states, true
@@ -87,44 +87,44 @@ def _pitch_acceleration(sensor_positions: dict[str, Any], specific_forces: np.nd
     return 0.5 * (m[:, 0, 2] - m[:, 2, 0])
 
 
-def flat_floor_error(engine: str, folder: Path) -> float:
+def flat_floor_error(engine_name: str, work_folder: Path) -> float:
     """Case: all sensors lie on a flat floor, and the pitch axis lies in their plane. Error: that of the pitch
     acceleration, divided by its largest value."""
-    felt, states, true = _readings_of_run(engine, FLOOR_SENSORS)
+    felt, states, true = _readings_of_run(engine_name, FLOOR_SENSORS)
     computed = angular_acceleration(spin_from_readings(sensor_array(FLOOR_SENSORS), felt), _angular_velocities(states))[
         :, 1
     ]
     return largest_magnitude(computed - true) / largest_magnitude(true)
 
 
-def flat_floor_naive(folder: Path) -> str:
+def flat_floor_naive(work_folder: Path) -> str:
     """Result of the printed formula on the readings of sensors on a flat floor, as text."""
     felt, _, true = _readings_of_run("reference", FLOOR_SENSORS)
     ratio = root_mean_square(_pitch_acceleration(FLOOR_SENSORS, felt)) / root_mean_square(true)
     return f"the printed formula gives {ratio:.2f} of the pitch acceleration"
 
 
-def nearly_flat_floor_error(engine: str, folder: Path) -> float:
+def nearly_flat_floor_error(engine_name: str, work_folder: Path) -> float:
     """Case: noisy sensors, the fifth only 3 cm above the plane of the others. Error: rms error of the pitch
     acceleration divided by the smallest that this noise can cause."""
-    felt, states, true = _readings_of_run(engine, LIFTED_SENSORS, noise=NOISE)
+    felt, states, true = _readings_of_run(engine_name, LIFTED_SENSORS, noise=NOISE)
     array = sensor_array(LIFTED_SENSORS)
     computed = angular_acceleration(spin_from_readings(array, felt), _angular_velocities(states))[:, 1]
     least_gain = array.noise_gains(planar=True)[1]
     return root_mean_square(computed - true) / (NOISE * least_gain)
 
 
-def nearly_flat_floor_naive(folder: Path) -> str:
+def nearly_flat_floor_naive(work_folder: Path) -> str:
     """Result of the printed formula on the readings of sensors nearly in a plane, as text."""
     felt, _, true = _readings_of_run("reference", LIFTED_SENSORS, noise=NOISE)
     error = root_mean_square(_pitch_acceleration(LIFTED_SENSORS, felt) - true)
     return f"the printed formula errs by {error:.1f} rad/s^2 for {NOISE:g} m/s^2 of noise"
 
 
-def loose_bracket_error(engine: str, folder: Path) -> float:
+def loose_bracket_error(engine_name: str, work_folder: Path) -> float:
     """Case: five rigid sensors and a sixth on a flexible bracket, which must be left out. Error: that of the pitch
     acceleration, divided by its largest value."""
-    felt, states, true = _readings_of_run(engine, ROOF_SENSORS, BRACKET_SENSORS)
+    felt, states, true = _readings_of_run(engine_name, ROOF_SENSORS, BRACKET_SENSORS)
     sensor_positions = ROOF_SENSORS | {"battery": (0.6, 0.3, 0.0)}
     loose = fit_quality(sensor_array(sensor_positions), felt).suspect
     keep = [name != loose for name in sensor_positions]
@@ -133,7 +133,7 @@ def loose_bracket_error(engine: str, folder: Path) -> float:
     return largest_magnitude(computed - true) / largest_magnitude(true)
 
 
-def loose_bracket_naive(folder: Path) -> str:
+def loose_bracket_naive(work_folder: Path) -> str:
     """Result without the guard, as text: the printed formula with all six sensors."""
     felt, _, true = _readings_of_run("reference", ROOF_SENSORS, BRACKET_SENSORS)
     wrong = largest_magnitude(
@@ -142,16 +142,16 @@ def loose_bracket_naive(folder: Path) -> str:
     return f"all six together are wrong by {100 * wrong:.0f} % of the largest pitch acceleration"
 
 
-def missing_reading_error(engine: str, folder: Path) -> float:
+def missing_reading_error(engine_name: str, work_folder: Path) -> float:
     """Case: one reading is NaN, which must be refused. Error: largest error of the recovered rates (rad/s)."""
-    felt, states, _ = _readings_of_run(engine, ROOF_SENSORS)
+    felt, states, _ = _readings_of_run(engine_name, ROOF_SENSORS)
     felt[100, 2, 0] = np.nan
     return largest_magnitude(
         recovered_motion(sensor_array(ROOF_SENSORS), felt, SAMPLE_PERIOD).rates - _angular_velocities(states)
     )
 
 
-def missing_reading_naive(folder: Path) -> str:
+def missing_reading_naive(work_folder: Path) -> str:
     """Result without the guard, as text: share of the record for which a sum over the printed formula's values is lost
     by one NaN."""
     felt, _, _ = _readings_of_run("reference", ROOF_SENSORS)
@@ -160,17 +160,17 @@ def missing_reading_naive(folder: Path) -> str:
     return f"a sum over one missing reading is lost for {100 * lost:.0f} % of the record"
 
 
-def _free_fall(engine: str, pitch: float, rate: float) -> tuple[np.ndarray, np.ndarray, StartState]:
+def _free_fall(engine_name: str, pitch: float, rate: float) -> tuple[np.ndarray, np.ndarray, StartState]:
     """Accelerometer readings, states and initial state of a rotating vehicle in free fall with unstressed struts."""
     p, sine, speed = vehicle().parameters, np.sin(pitch), np.cos(pitch) * rate
     start = np.array([-p.b * sine, p.a * sine, 0, pitch, -p.b * speed, p.a * speed, 0, rate])
-    felt, states, _ = _readings_of_run(engine, ROOF_SENSORS, initial=start)
+    felt, states, _ = _readings_of_run(engine_name, ROOF_SENSORS, initial=start)
     return felt, states, StartState.pitched(pitch, rate)
 
 
-def vertical_nose_error(engine: str, folder: Path) -> float:
+def vertical_nose_error(engine_name: str, work_folder: Path) -> float:
     """Case: the nose passes through the vertical. Error: largest difference of an entry of the rotation matrix."""
-    felt, states, start = _free_fall(engine, 1.4, 3.0)
+    felt, states, start = _free_fall(engine_name, 1.4, 3.0)
     orientation = recovered_motion(sensor_array(ROOF_SENSORS), felt, SAMPLE_PERIOD, start).orientation
     no_angles = np.zeros(len(states))
     return largest_magnitude(
@@ -178,16 +178,16 @@ def vertical_nose_error(engine: str, folder: Path) -> float:
     )
 
 
-def gimbal_lock_error(engine: str, folder: Path) -> float:
+def gimbal_lock_error(engine_name: str, work_folder: Path) -> float:
     """Case: the nose points straight up, where roll and yaw are not unique; it must be refused. Error: largest roll or
     yaw (rad) that is returned."""
-    felt, _, start = _free_fall(engine, np.pi / 2, 0.0)
+    felt, _, start = _free_fall(engine_name, np.pi / 2, 0.0)
     return largest_magnitude(
         recovered_motion(sensor_array(ROOF_SENSORS), felt, SAMPLE_PERIOD, start).angles()[:, [0, 2]]
     )
 
 
-def gimbal_lock_naive(folder: Path) -> str:
+def gimbal_lock_naive(work_folder: Path) -> str:
     """Result without the guard, as text: roll angle by the textbook's formula at gimbal lock."""
     s = rotation_matrix(quaternion_from_cardan(0.3, np.pi / 2, 0.0))
     roll = np.arctan2(s[2, 1], s[2, 2])

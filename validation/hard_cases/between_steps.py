@@ -36,8 +36,8 @@ def released_wheelset_case(speed: float = 60.0, yaw: float = 0.0, **changed: flo
     """Case: a wheelset is released 5 mm off centre and runs for 0.2 s. Error: difference of its final lateral position
     and yaw (m, rad) from a run with a quarter of the step."""
 
-    def error(implementation: str, folder: Path) -> float:
-        equations = built_wheelset(implementation, CHOSEN_WHEELSET.changed(**changed), speed)
+    def error(engine_name: str, work_folder: Path) -> float:
+        equations = built_wheelset(engine_name, CHOSEN_WHEELSET.changed(**changed), speed)
         start = equations.displaced_state(5e-3)
         start[3] = yaw
         ends = [equations.run(start, 0.2, step).states[-1] for step in (STEP, STEP / 4.0)]
@@ -46,20 +46,20 @@ def released_wheelset_case(speed: float = 60.0, yaw: float = 0.0, **changed: flo
     return error
 
 
-def car_scene(step: float = 1e-3, **manoeuvre: Any) -> HandlingScene:
+def car_scene(time_step: float = 1e-3, **manoeuvre: Any) -> HandlingScene:
     """Scene of a car with 19 degrees of freedom in a manoeuvre of 0.2 s; step in s."""
     driven = {"hard": {"speed": 20.0, "duration": 0.2} | manoeuvre}
-    return build({"title": "hard", "system": "handling", "run": {"step": step}, "manoeuvres": driven})
+    return build({"title": "hard", "system": "handling", "run": {"step": time_step}, "manoeuvres": driven})
 
 
 def manoeuvre_case(**manoeuvre: Any) -> Callable[[str, Path], float]:
     """Case: a car in a manoeuvre. Error: difference of its final coordinates (m, rad) from a run with a quarter of the
     step."""
 
-    def error(implementation: str, folder: Path) -> float:
-        if implementation == "reference":
-            raise InputError("", "engine", implementation, "handling is marched by engines")
-        ends = [run(car_scene(step, **manoeuvre), implementation)["positions"][-1] for step in (1e-3, 2.5e-4)]
+    def error(engine_name: str, work_folder: Path) -> float:
+        if engine_name == "reference":
+            raise InputError("", "engine", engine_name, "handling is marched by engines")
+        ends = [run(car_scene(step, **manoeuvre), engine_name)["positions"][-1] for step in (1e-3, 2.5e-4)]
         return float(np.abs(ends[1] - ends[0]).max())
 
     return error
@@ -68,14 +68,14 @@ def manoeuvre_case(**manoeuvre: Any) -> Callable[[str, Path], float]:
 def refused_case(answer_anyway: Callable[[], Any]) -> Callable[[str, Path], float]:
     """Case: ``answer_anyway`` must raise a refusal. Error: infinite if it returns."""
 
-    def error(implementation: str, folder: Path) -> float:
+    def error(engine_name: str, work_folder: Path) -> float:
         answer_anyway()
         return np.inf
 
     return error
 
 
-def hubs_over_waves(implementation: str, folder: Path) -> float:
+def hubs_over_waves(engine_name: str, work_folder: Path) -> float:
     """Case: hub forces of a road at 60 m/s in steps of 20 ms, each of which passes three waves; it must fail. Error:
     infinite if it does not."""
     table = {
@@ -86,44 +86,44 @@ def hubs_over_waves(implementation: str, folder: Path) -> float:
         "run": {"duration": 1.0, "step": 0.02},
         "forces": {"sampling_rate": 50.0},
     }
-    run_on_hubs(build_hubs(table), implementation, error=True)
+    run_on_hubs(build_hubs(table), engine_name, error=True)
     return np.inf
 
 
-def driven_over_waves(implementation: str, folder: Path) -> float:
+def driven_over_waves(engine_name: str, work_folder: Path) -> float:
     """Case: a car on a rough road at 1000 m/s in steps of 1 ms. Error: true error (against a tenth of the step) divided
     by the stated error in the worst channel; infinite unless the stated error is a warning."""
-    if implementation == "reference":
-        raise InputError("", "engine", implementation, "handling is marched by engines")
-    stated_run = run(car_scene(speed=1000.0, rough=True), implementation, error=True)
+    if engine_name == "reference":
+        raise InputError("", "engine", engine_name, "handling is marched by engines")
+    stated_run = run(car_scene(speed=1000.0, rough=True), engine_name, error=True)
     name, estimate = max(errors_of(stated_run).items(), key=lambda each: each[1].share)
-    fine = principal_series(run(car_scene(1e-4, speed=1000.0, rough=True), implementation).detail).channels[name][::10]
+    fine = principal_series(run(car_scene(1e-4, speed=1000.0, rough=True), engine_name).detail).channels[name][::10]
     error_of_values = principal_series(stated_run.detail).channels[name] - fine
     return float(np.sqrt(np.mean(error_of_values**2))) / estimate.error if estimate.warned else np.inf
 
 
-def level_crossing_error(implementation: str, folder: Path) -> float:
+def level_crossing_error(engine_name: str, work_folder: Path) -> float:
     """Case: level crossings counted for unsorted levels. Error: difference from counting level by level."""
     load, levels = np.array([0.0, 3.0, 1.0, 5.0, 0.0, 2.0, 1.0, 4.0]), np.array([2.5, 0.5, 3.5, 1.5])
     rises = [sum(a < level <= b for a, b in pairwise(load)) for level in levels]
     return float(np.abs(level_crossings(load, levels) - rises).max())
 
 
-def equal_seed_streams(implementation: str, folder: Path) -> float:
+def equal_seed_streams(engine_name: str, work_folder: Path) -> float:
     """Case: noise seeds near 2^63 and at the end of the range. Error: number of seeds with the same stream as another
     seed."""
     seeds = (2**63 - 1, 2**63, 2**63 + 1, 2**64 - 2, 2**64 - 1)
     return float(len(seeds) - len({float(normal_samples(seed, 0, 1, 1)[0, 0]) for seed in seeds}))
 
 
-def low_passed_line_error(implementation: str, folder: Path) -> float:
+def low_passed_line_error(engine_name: str, work_folder: Path) -> float:
     """Case: a straight line of 2 s through the slowest low-pass filter that is allowed. Error: largest change divided
     by the line's rise."""
     line = np.linspace(0.0, 1.0, 2001)[:, None]
     return float(np.abs(low_passed(line, 1e-3, 0.5, "", "bandwidth") - line).max())
 
 
-def slow_filter_naive(folder: Path) -> str:
+def slow_filter_naive(work_folder: Path) -> str:
     """Result without the guard, as text: the filter alone, with a fiftieth of its period in the record."""
     from scipy.signal import butter, sosfiltfilt
 

@@ -10,7 +10,7 @@ from validation.hard_cases.case import Case
 LOOPED = of_wheels(Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
 
 
-def step_split_error(implementation: str, folder: Path) -> float:
+def step_split_error(engine_name: str, work_folder: Path) -> float:
     """Case: a random pressure path in 1, 7 and 50 steps between its turning points. Error: largest difference of the
     torque (N m) at the turning points."""
     turns = np.concatenate(([0.0], np.random.default_rng(2).uniform(0.0, 6.0, 60)))
@@ -21,7 +21,7 @@ def step_split_error(implementation: str, folder: Path) -> float:
     return float(max(np.abs(walk - levels[0]).max() for walk in levels))
 
 
-def negative_loop_area(implementation: str, folder: Path) -> float:
+def negative_loop_area(engine_name: str, work_folder: Path) -> float:
     """Case: hysteresis loops between random pressures, in 1000 steps each way. Error: magnitude of the most negative
     area (N m bar) or torque (N m)."""
     worst = 0.0

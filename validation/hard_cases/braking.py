@@ -25,7 +25,7 @@ from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
 def refusal_case(run: Callable[[], Any]) -> wheels.Error:
     """Case: ``run`` must raise a refusal. Error: infinite if it returns."""
 
-    def error(implementation: str, folder: Path) -> float:
+    def error(engine_name: str, work_folder: Path) -> float:
         run()
         return np.inf
 

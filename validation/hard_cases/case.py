@@ -40,20 +40,20 @@ class Case:
     answer_independence: Independence = "closed form"
     without_engine: bool = False
 
-    def wanted(self, implementation: str) -> OutcomeWord:
+    def wanted(self, engine_name: str) -> OutcomeWord:
         """The outcome that an implementation must have in this case."""
-        return self.expected.get(implementation, "right")
+        return self.expected.get(engine_name, "right")
 
     def judged(self) -> tuple[str, ...]:
         """Names of the implementations in which this case is judged."""
         return IMPLEMENTATIONS[:1] if self.without_engine else IMPLEMENTATIONS
 
-    def independence(self, implementation: str) -> Independence:
+    def independence(self, engine_name: str) -> Independence:
         """How independent the exact answer is of an implementation. The tight-tolerance solution uses the reference's
         equations, so that for the reference it is a shared kernel."""
         return (
             "shared kernel"
-            if self.answer_independence == "native" and implementation == "reference"
+            if self.answer_independence == "native" and engine_name == "reference"
             else self.answer_independence
         )
 
@@ -68,11 +68,11 @@ class CaseOutcome:
     message: str = ""
 
 
-def judge(case: Case, implementation: str, folder: Path) -> CaseOutcome:
+def judge(case: Case, engine_name: str, work_folder: Path) -> CaseOutcome:
     """Outcome of a case in an implementation. Only InputError and RunFailed count as outcomes; other exceptions pass
     through."""
     try:
-        error = float(case.error(implementation, folder))
+        error = float(case.error(engine_name, work_folder))
     except InputError as refusal:
         return CaseOutcome("refused", message=str(refusal))
     except RunFailed as failure:

@@ -29,13 +29,13 @@ def _linear_error(cells: int, march_name: March) -> float:
     return abs(float(answer.fx / forces(A, B, SMALL_CREEPAGE, 0.0, 0.0, MATERIAL_PAIR)[0]) - 1.0)
 
 
-def few_cells_error(implementation: str, folder: Path) -> float:
+def few_cells_error(engine_name: str, work_folder: Path) -> float:
     """Case: small creepage on 8, 16 and 32 cells. Error: largest relative error of the force divided by the bound 1.7
     (8 / cells)^1.9 per cent."""
     return max(_linear_error(n, "second-order") / (0.017 * (8.0 / n) ** 1.9) for n in (8, 16, 32))
 
 
-def few_cells_naive(folder: Path) -> str:
+def few_cells_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: error on few cells if the first step at the leading edge is a complete
     one."""
     return f"a whole first step makes the force {100 * _linear_error(8, 'plain'):.1f} % too large by 8 cells"
@@ -51,7 +51,7 @@ def _draw_creepages(draw_count: int = 400) -> np.ndarray:
     )
 
 
-def reversal_error(implementation: str, folder: Path) -> float:
+def reversal_error(engine_name: str, work_folder: Path) -> float:
     """Case: all creepages reversed. Error: largest difference between the forces and the reversed forces, divided by mu
     N."""
     creepage_along, across, spin = _draw_creepages()
@@ -60,7 +60,7 @@ def reversal_error(implementation: str, folder: Path) -> float:
     return float(max(np.abs(first.fx + second.fx).max(), np.abs(first.fy + second.fy).max()) / (MU * LOAD))
 
 
-def mirror_error(implementation: str, folder: Path) -> float:
+def mirror_error(engine_name: str, work_folder: Path) -> float:
     """Case: left and right exchanged, so that lateral creepage, spin and lateral force change sign. Error: largest
     difference of the forces divided by mu N."""
     creepage_along, across, spin = _draw_creepages()
@@ -71,7 +71,7 @@ def mirror_error(implementation: str, folder: Path) -> float:
     return float(max(np.abs(first.fx - second.fx).max(), np.abs(first.fy + second.fy).max()) / (MU * LOAD))
 
 
-def power_gained(implementation: str, folder: Path) -> float:
+def power_gained(engine_name: str, work_folder: Path) -> float:
     """Case: random creepages on 21 cells. Error: largest energy that a contact gains per metre, divided by mu N times
     the creepage."""
     creepage_along, across, spin = _draw_creepages()
@@ -80,7 +80,7 @@ def power_gained(implementation: str, folder: Path) -> float:
     return float(max(np.max(-lost / size), 0.0))
 
 
-def pure_spin_error(implementation: str, folder: Path) -> float:
+def pure_spin_error(engine_name: str, work_folder: Path) -> float:
     """Case: pure spin. Error: the larger of the longitudinal force divided by mu N and, for small spin, the relative
     error of the lateral force against the linear theory."""
     small = fastsim(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 1e-6), MATERIAL_PAIR)
@@ -96,7 +96,7 @@ def _balls(centre_distance: float, load: float, cells: tuple[int, int] = (41, 10
     return solve_normal(away / (2.0 * RADIUS), CELL, CELL, MATERIAL_PAIR, load=load)
 
 
-def two_patch_error(implementation: str, folder: Path) -> float:
+def two_patch_error(engine_name: str, work_folder: Path) -> float:
     """Case: two separate contact patches. Error: the larger of the relative error of a patch's load and of the
     difference of the area from that of single balls beyond the cells along the edges."""
     draw = _balls(9e-3, 2.0 * BALL_LOAD)
@@ -108,7 +108,7 @@ def two_patch_error(implementation: str, folder: Path) -> float:
     )
 
 
-def merging_patch_error(implementation: str, folder: Path) -> float:
+def merging_patch_error(engine_name: str, work_folder: Path) -> float:
     """Case: two balls approach each other in steps of a fifth of a cell. Error: largest second difference of the
     approach, divided by the approach."""
     answer = [
@@ -117,7 +117,7 @@ def merging_patch_error(implementation: str, folder: Path) -> float:
     return float(np.abs(np.diff(answer, 2)).max() / answer[0])
 
 
-def load_at_grid_edge(implementation: str, folder: Path) -> float:
+def load_at_grid_edge(engine_name: str, work_folder: Path) -> float:
     """Case: a contact patch that the grid's edge cuts off, which must be refused. Error: the load (N) that is
     returned."""
     return _balls(9e-3, 2.0 * BALL_LOAD, (41, 61)).load

@@ -24,17 +24,17 @@ def _base_assembly(values: np.ndarray) -> Assembly:
     return setups.driven_by_forces(base, replace(forces, values=forces.values + values))
 
 
-def covariance_error(engine: str, folder: Path) -> float:
+def covariance_error(engine_name: str, work_folder: Path) -> float:
     """Case: a force error of 1 N in each single sample is simulated. Error: relative difference between the sum of
     squared responses and the covariance recursion."""
-    quiet = setups.run(engine, _base_assembly(np.zeros((SAMPLES, 2))), STEP, SAMPLE_PERIOD * SAMPLES).states[-1]
+    quiet = setups.run(engine_name, _base_assembly(np.zeros((SAMPLES, 2))), STEP, SAMPLE_PERIOD * SAMPLES).states[-1]
     responses = []
     for sample in range(SAMPLES):
         for wheel in range(2):
             values = np.zeros((SAMPLES, 2))
             values[sample, wheel] = 1.0
             responses.append(
-                setups.run(engine, _base_assembly(values), STEP, SAMPLE_PERIOD * SAMPLES).states[-1] - quiet
+                setups.run(engine_name, _base_assembly(values), STEP, SAMPLE_PERIOD * SAMPLES).states[-1] - quiet
             )
     covariance, expected = np.array(responses).T @ np.array(responses), _covariance_recursion()
     return setups.largest_magnitude(covariance - expected) / setups.largest_magnitude(expected)
@@ -46,7 +46,7 @@ def _covariance_recursion() -> np.ndarray:
     return noise_covariances(ErrorPath(assembly, assembly.input, round(SAMPLE_PERIOD / STEP), SAMPLES), 1.0)[-1]
 
 
-def van_loan_naive(folder: Path) -> str:
+def van_loan_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: process noise over one and over twenty periods by filterpy's van Loan
     discretisation."""
     from filterpy.common import van_loan_discretization

@@ -45,11 +45,11 @@ def true_run(grade: float = 0.0) -> Result:
 
 
 def scene_on_true_forces(
-    folder: Path, truth: Result, effects: dict[str, Any] | None = None, tilt: float = 0.0
+    work_folder: Path, truth: Result, effects: dict[str, Any] | None = None, tilt: float = 0.0
 ) -> Scene:
     """Scene under the wheel forces of the true run, with a wrong initial pitch rate ``tilt`` (rad/s)."""
-    write_measurement(truth, folder, 1e-3)
-    scene = force_scene(folder, duration=DURATION, effects=effects)
+    write_measurement(truth, work_folder, 1e-3)
+    scene = force_scene(work_folder, duration=DURATION, effects=effects)
     return scene.model_copy(update={"start": {"pitch_rate": tilt}} if tilt else {})
 
 
@@ -58,22 +58,24 @@ def figures_and_errors(run: Result, truth: Result, scene: Scene) -> tuple[RunFig
     return figures_of_run(run, scene.vehicle_parameters()), errors_of_run(run, truth)
 
 
-def verdict_words(engine: str, scene: Scene, truth: Result) -> tuple[str, str]:
+def verdict_words(engine_name: str, scene: Scene, truth: Result) -> tuple[str, str]:
     """Words of the verdicts on a run in an engine, with and without knowledge of the true run."""
-    scores, wrong = figures_and_errors(simulate(scene, engine), truth, scene)
+    scores, wrong = figures_and_errors(simulate(scene, engine_name), truth, scene)
     known = blind_verdict(scores, scene.effects, DURATION, Limits())
     return verdict_on_run(scores, wrong, scene.effects, Limits()).word, known.word
 
 
-def tumbled_verdict_error(engine: str, folder: Path) -> float:
+def tumbled_verdict_error(engine_name: str, work_folder: Path) -> float:
     """Case: a free run that has turned over must be rejected, with and without the true run. Error: 1 if it is not."""
-    judged = verdict_words(engine, scene_on_true_forces(folder, true_run(), tilt=WRONG_PITCH_RATE), true_run())
+    judged = verdict_words(
+        engine_name, scene_on_true_forces(work_folder, true_run(), tilt=WRONG_PITCH_RATE), true_run()
+    )
     return float(judged != ("rejected", "rejected"))
 
 
-def tumbled_naive(folder: Path) -> str:
+def tumbled_naive(work_folder: Path) -> str:
     """Result without the guard, as text: damage of a tumbled run from its vertical forces alone."""
-    scene = scene_on_true_forces(folder, true_run(), tilt=WRONG_PITCH_RATE)
+    scene = scene_on_true_forces(work_folder, true_run(), tilt=WRONG_PITCH_RATE)
     scores, wrong = figures_and_errors(simulate(scene, "reference"), true_run(), scene)
     return (
         f"at a pitch of {scores.pitch_max:.1f} rad its vertical f3 does {wrong.vertical_damage['f3']:.3f} times the "
@@ -85,17 +87,19 @@ SOFT_SPRING = {"pitch_spring": {"stiffness": SOFT_STIFFNESS, "damping": 250.0}}
 FIRM_SPRING = {"pitch_spring": {"stiffness": 300.0, "damping": 600.0}}
 
 
-def soft_spring_verdict_error(engine: str, folder: Path) -> float:
+def soft_spring_verdict_error(engine_name: str, work_folder: Path) -> float:
     """Case: a run with a stabilising spring that is too soft must be rejected. Error: 1 if it is not."""
     return float(
-        verdict_words(engine, scene_on_true_forces(folder, true_run(), SOFT_SPRING, WRONG_PITCH_RATE), true_run())[0]
+        verdict_words(
+            engine_name, scene_on_true_forces(work_folder, true_run(), SOFT_SPRING, WRONG_PITCH_RATE), true_run()
+        )[0]
         != "rejected"
     )
 
 
-def soft_spring_naive(folder: Path) -> str:
+def soft_spring_naive(work_folder: Path) -> str:
     """Result without the guard, as text: figures of the run itself, which do not show that the spring is too soft."""
-    scene = scene_on_true_forces(folder, true_run(), SOFT_SPRING, WRONG_PITCH_RATE)
+    scene = scene_on_true_forces(work_folder, true_run(), SOFT_SPRING, WRONG_PITCH_RATE)
     scores, wrong = figures_and_errors(simulate(scene, "reference"), true_run(), scene)
     return (
         f"its artificial moment is {scores.moment_share_band:.1%} of I pitch'' and its vertical f3 does "
@@ -103,16 +107,16 @@ def soft_spring_naive(folder: Path) -> str:
     )
 
 
-def graded_verdict_error(engine: str, folder: Path) -> float:
+def graded_verdict_error(engine_name: str, work_folder: Path) -> float:
     """Case: a stabilising spring on a grade, which gives wrong results. Error: 0 if the run is rejected with the true
     run and not accepted without it, else 1."""
-    judged = verdict_words(engine, scene_on_true_forces(folder, true_run(0.1), FIRM_SPRING), true_run(0.1))
+    judged = verdict_words(engine_name, scene_on_true_forces(work_folder, true_run(0.1), FIRM_SPRING), true_run(0.1))
     return float(judged != ("rejected", "stabilise"))
 
 
-def graded_naive(folder: Path) -> str:
+def graded_naive(work_folder: Path) -> str:
     """Figures of a run with a stabilising spring on a graded road, as text."""
-    scene = scene_on_true_forces(folder, true_run(0.1), FIRM_SPRING)
+    scene = scene_on_true_forces(work_folder, true_run(0.1), FIRM_SPRING)
     scores, wrong = figures_and_errors(simulate(scene, "reference"), true_run(0.1), scene)
     return (
         f"its artificial moment is {scores.moment_share_band:.1%} of I pitch''; its pitch is {wrong.pitch_max:.2f} "
@@ -125,14 +129,14 @@ def _random_walk() -> np.ndarray:
     return np.random.default_rng(2).standard_normal(500).cumsum()
 
 
-def damage_with_nan(engine: str, folder: Path) -> float:
+def damage_with_nan(engine_name: str, work_folder: Path) -> float:
     """Case: a load with one sample that is NaN must be refused. Error: the damage that is returned."""
     load = _random_walk().copy()
     load[250] = np.nan
     return pseudo_damage(load)
 
 
-def damage_with_nan_naive(folder: Path) -> str:
+def damage_with_nan_naive(work_folder: Path) -> str:
     """Result without the guard, as text: damage of a load with a NaN by the rainflow library."""
     from rainflow import extract_cycles
 
@@ -142,53 +146,53 @@ def damage_with_nan_naive(folder: Path) -> str:
     return f"rainflow alone finds {damage / pseudo_damage(_random_walk()):.2g} times the damage of the whole load"
 
 
-def damage_without_samples(engine: str, folder: Path) -> float:
+def damage_without_samples(engine_name: str, work_folder: Path) -> float:
     """Case: a load without samples must be refused. Error: the damage that is returned."""
     return pseudo_damage(np.empty(0))
 
 
-def ratio_to_constant_load(engine: str, folder: Path) -> float:
+def ratio_to_constant_load(engine_name: str, work_folder: Path) -> float:
     """Case: a damage ratio to a constant true load, which has no damage, must be refused. Error: the ratio that is
     returned."""
     return damage_ratio(_random_walk(), np.full(500, 3.0))
 
 
-def ratio_of_huge_loads(engine: str, folder: Path) -> float:
+def ratio_of_huge_loads(engine_name: str, work_folder: Path) -> float:
     """Case: a ratio of two damages beyond the range of floating-point numbers must be refused. Error: the ratio that is
     returned."""
     load = np.array([0.0, 1e200, 0.0])
     return damage_ratio(load, load)
 
 
-def damage_with_nan_slope(engine: str, folder: Path) -> float:
+def damage_with_nan_slope(engine_name: str, work_folder: Path) -> float:
     """Case: a Wöhler slope that is NaN, which a range of 1 would hide, must be refused. Error: the damage that is
     returned."""
     return pseudo_damage(np.array([0.0, 1.0, 0.0]), np.nan)
 
 
-def negative_intensity_drift_off(engine: str, folder: Path) -> float:
+def negative_intensity_drift_off(engine_name: str, work_folder: Path) -> float:
     """Case: drift-off time under noise of negative intensity must be refused. Error: the time that is returned."""
     return drift_off_time(1.0, -1.0, 0.05)
 
 
-def two_point_damage_error(engine: str, folder: Path) -> float:
+def two_point_damage_error(engine_name: str, work_folder: Path) -> float:
     """Case: a load with two samples, which is half a cycle. Error: difference of its damage from 0.5 range^5."""
     return abs(pseudo_damage(np.array([0.0, 2.0]), 5.0) - 0.5 * 2.0**5)
 
 
-def two_points_naive(folder: Path) -> str:
+def two_points_naive(work_folder: Path) -> str:
     """Result without the guard, as text: damage of a load with two samples by the rainflow library."""
     from rainflow import extract_cycles
 
     return f"rainflow alone finds {len(list(extract_cycles([0.0, 2.0])))} cycles in it"
 
 
-def difference_before_drift(engine: str, folder: Path) -> float:
+def difference_before_drift(engine_name: str, work_folder: Path) -> float:
     """Case: a noisy run compared with another implementation until drift-off. Error: largest difference of the states
     divided by the largest state."""
-    scene = scene_on_true_forces(folder, true_run(), {"force_noise": {"deviation": HEAVY_NOISE}})
-    other_engine = "mujoco" if engine == "reference" else "reference"
-    first, second_run = (simulate(scene, name) for name in (engine, other_engine))
+    scene = scene_on_true_forces(work_folder, true_run(), {"force_noise": {"deviation": HEAVY_NOISE}})
+    other_engine = "mujoco" if engine_name == "reference" else "reference"
+    first, second_run = (simulate(scene, name) for name in (engine_name, other_engine))
     rows_before = slice(None, _first_row_off(first, true_run()))
     return largest_magnitude(first.states[rows_before] - second_run.states[rows_before]) / largest_magnitude(
         second_run.states[rows_before]
@@ -202,11 +206,11 @@ def _first_row_off(run: Result, truth: Result) -> int | None:
     return int(far[0]) if len(far) else None
 
 
-def before_drift_naive(folder: Path) -> str:
+def before_drift_naive(work_folder: Path) -> str:
     """Result without the guard, as text: two step sizes of the reference compared over 30 s, beyond drift-off."""
     truth = simulate(road_scene(duration=30.0), "reference")
-    write_measurement(truth, folder, 1e-3)
-    scene = force_scene(folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY_NOISE}})
+    write_measurement(truth, work_folder, 1e-3)
+    scene = force_scene(work_folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY_NOISE}})
     coarse, fine = (simulate(scene, "reference", Settings("RK4", step, 30.0)) for step in (1e-3, 5e-4))
     gap = np.abs(coarse["pitch"] - fine["pitch"][::2])
     gap_before = gap[: _first_row_off(coarse, truth)].max()

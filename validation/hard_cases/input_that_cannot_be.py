@@ -76,11 +76,11 @@ def error_texts(change: ForceChange) -> list[str]:
     return [finding.text for finding in findings if finding.weight == "doubt"]
 
 
-def _missed_doubts(change: ForceChange, doubted: bool, _: str, folder: Path) -> float:
+def _missed_doubts(change: ForceChange, doubted: bool, _: str, work_folder: Path) -> float:
     return abs(len(error_texts(change)) - doubted)
 
 
-def _unqueried_vehicle(change: dict[str, float], _: str, folder: Path) -> float:
+def _unqueried_vehicle(change: dict[str, float], _: str, work_folder: Path) -> float:
     return float(not plausible_plane(TWIN.model_copy(update=change)))
 
 

@@ -29,7 +29,7 @@ SLOW_PERIOD = 0.1
 
 
 def _largest_pitch_error(
-    engine: str, folder: Path, lost_samples: slice, turn_deviation: float = 0.0, **options: Any
+    engine_name: str, work_folder: Path, lost_samples: slice, turn_deviation: float = 0.0, **options: Any
 ) -> float:
     """Largest pitch error divided by its stated deviation for a vehicle at rest, with the pitch missing in the
     ``lost_samples`` samples.
@@ -39,10 +39,10 @@ def _largest_pitch_error(
     count = round(DURATION / SAMPLE_PERIOD) + 1
     base = vehicle()
     forces = static_forces(base, count, SAMPLE_PERIOD, is_held=False).values
-    write_wheel_forces(folder, forces[:, 0], forces[:, 1], SAMPLE_PERIOD)
+    write_wheel_forces(work_folder, forces[:, 0], forces[:, 1], SAMPLE_PERIOD)
     measured_pitch = base.initial[3] + ANGLE * normal_samples(7, 0, count, 1, source=PITCH_SENSOR)[:, 0]
     measured_pitch[lost_samples] = np.nan
-    write_time_series(folder / "pitch.csv", {"pitch": ("rad", measured_pitch)}, SAMPLE_PERIOD)
+    write_time_series(work_folder / "pitch.csv", {"pitch": ("rad", measured_pitch)}, SAMPLE_PERIOD)
     p, start = base.parameters, base.initial.copy()
     start[[0, 1, 3]] += turn_deviation * np.array([-p.b, p.a, 1.0])
     scene = build(
@@ -57,20 +57,20 @@ def _largest_pitch_error(
             },
         },
         "kalman",
-        folder,
+        work_folder,
     )
-    run = simulate(scene, engine)
+    run = simulate(scene, engine_name)
     ended = SAMPLE_PERIOD * (lost_samples.stop or 0)
     late = (run.times < ended) | (run.times > ended + 1.0)  # the moment takes a while to draw the vehicle back
     return largest_magnitude(((run["pitch"] - base.initial[3]) / run["pitch_deviation"])[late & (run.times > 0.1)])
 
 
-def outage_error(engine: str, folder: Path) -> float:
+def outage_error(engine_name: str, work_folder: Path) -> float:
     """Case: no pitch measurement for 3.5 s. Error: largest pitch error divided by its stated deviation."""
-    return _largest_pitch_error(engine, folder, slice(200, 900))
+    return _largest_pitch_error(engine_name, work_folder, slice(200, 900))
 
 
-def outage_naive(folder: Path) -> str:
+def outage_naive(work_folder: Path) -> str:
     """Result without the guard, as text: the filter library's own update with a NaN."""
     kalman = ExtendedKalmanFilter(2, 1)
     kalman.x = np.zeros(2)
@@ -78,13 +78,13 @@ def outage_naive(folder: Path) -> str:
     return f"filterpy takes the NaN in without a word: its state is {kalman.x[0]} for ever after"
 
 
-def wrong_start_error(engine: str, folder: Path) -> float:
+def wrong_start_error(engine_name: str, work_folder: Path) -> float:
     """Case: the initial pitch is wrong by one stated deviation. Error: largest pitch error divided by its stated
     deviation."""
-    return _largest_pitch_error(engine, folder, slice(0, 0), START_TURN, start_deviation=START_TURN)
+    return _largest_pitch_error(engine_name, work_folder, slice(0, 0), START_TURN, start_deviation=START_TURN)
 
 
-def certain_start_error(engine: str, folder: Path) -> float:
+def certain_start_error(engine_name: str, work_folder: Path) -> float:
     """Case: angles measured to 1e-9 rad after an initial uncertainty of 1 rad. Error: largest pitch error divided by
     its stated deviation; infinite for a negative variance."""
     count, exact = 400, 1e-9
@@ -110,10 +110,10 @@ def certain_start_error(engine: str, folder: Path) -> float:
     return float(np.abs(error_of_values / np.sqrt(P[1:, PITCH, PITCH])).max())
 
 
-def empty_column_error(engine: str, folder: Path) -> float:
+def empty_column_error(engine_name: str, work_folder: Path) -> float:
     """Case: a pitch measurement without any number must be refused. Error: largest pitch error divided by its stated
     deviation."""
-    return _largest_pitch_error(engine, folder, slice(None))
+    return _largest_pitch_error(engine_name, work_folder, slice(None))
 
 
 def _exact_response() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -125,7 +125,7 @@ def _exact_response() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return a, b, expm(block * SLOW_PERIOD)[:6, 6:]
 
 
-def stiff_process_noise_error(engine: str, folder: Path) -> float:
+def stiff_process_noise_error(engine_name: str, work_folder: Path) -> float:
     """Case: process noise of a filter with forces at 10 Hz, for a vehicle with a pole at -697 1/s. Error: relative
     difference from the exact covariance."""
     base = vehicle(geometry="linear")
@@ -136,7 +136,7 @@ def stiff_process_noise_error(engine: str, folder: Path) -> float:
     return float(np.linalg.norm(early @ early.T - wanted @ wanted.T) / np.linalg.norm(wanted @ wanted.T))
 
 
-def stiff_naive(folder: Path) -> str:
+def stiff_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: process noise of the stiff vehicle by filterpy's discretisation."""
     a, b, wanted = _exact_response()
     noise = van_loan_discretization(a, b * np.sqrt(SLOW_PERIOD), SLOW_PERIOD)[1]

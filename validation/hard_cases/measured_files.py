@@ -18,25 +18,25 @@ CHECKS = {
 }
 
 
-def numpy_on_cut_number(folder: Path) -> str:
+def numpy_on_cut_number(work_folder: Path) -> str:
     """Text on the value that numpy reads from a file that was cut off within a number."""
-    path = file_of_bytes(csv.usual_text()[:-3].encode())(folder)
+    path = file_of_bytes(csv.usual_text()[:-3].encode())(work_folder)
     last_value = np.genfromtxt(path, delimiter=",", skip_header=1)[-1, 2]
     return f"numpy reads the last value as {last_value:g}, which was {FX[-1]:g}"
 
 
-def asammdf_on_invalid_samples(folder: Path) -> str:
+def asammdf_on_invalid_samples(work_folder: Path) -> str:
     """Text on what asammdf returns for samples that are marked as invalid."""
-    path = next(odd_file for odd_file in mdf4.FILES if odd_file.name == "MDF 4 with invalid samples").make(folder)
+    path = next(odd_file for odd_file in mdf4.FILES if odd_file.name == "MDF 4 with invalid samples").make(work_folder)
     with mdf4_opened(path) as file:
         samples = file.get(group=0, index=1, samples_only=True, data=next(file._mdf._load_data(file.groups[0])))[0]
     return f"asammdf hands over {len(samples)} of {len(FZ)} samples of a block, those after a gap moved up"
 
 
-def nptdms_on_cut_segment(folder: Path) -> str:
+def nptdms_on_cut_segment(work_folder: Path) -> str:
     """Text on what npTDMS reads from a file that was cut off."""
-    with BoundedFile(tdms.cut_by(100)(folder)) as file:
-        lengths = [len(channel) for group in opened_tdms(folder, file).groups() for channel in group.channels()]
+    with BoundedFile(tdms.cut_by(100)(work_folder)) as file:
+        lengths = [len(channel) for group in opened_tdms(work_folder, file).groups() for channel in group.channels()]
     return f"npTDMS hands over channels of {' and '.join(map(str, lengths))} samples"
 
 

@@ -40,7 +40,7 @@ from validation.hard_cases.case import Case
 FRICTION, CELLS = 0.3, 15
 
 
-def long_wave_error(implementation: str, folder: Path) -> float:
+def long_wave_error(engine_name: str, work_folder: Path) -> float:
     """Case: nonlinear quarter cars on two roads that differ only in waves longer than 60 m. Error: largest relative
     difference of the standard deviations.
 
@@ -73,7 +73,7 @@ def slender_ellipse_case(a: float, b: float) -> Callable[[str, Path], float]:
     """Case: a contact ellipse with semi-axes a, b (m) under spin. Error: difference of FASTSIM from the exact theory
     divided by its stated error."""
 
-    def error(implementation: str, folder: Path) -> float:
+    def error(engine_name: str, work_folder: Path) -> float:
         pair = MaterialPair()
         hertz, motion = by_axes(a, b, pair, load=1e5), (0.0, 1e-3, 0.5)
         choices: dict[str, Any] = {"flexibilities": "blended", "bound": "intermediate", "march": "second-order"}
@@ -90,7 +90,7 @@ def slender_ellipse_case(a: float, b: float) -> Callable[[str, Path], float]:
     return error
 
 
-def scaled_drift_off_error(implementation: str, folder: Path) -> float:
+def scaled_drift_off_error(engine_name: str, work_folder: Path) -> float:
     """Case: drift-off times with noise and angle scaled together over 300 decades. Error: relative difference of the
     times, which must be equal."""
     off_time = drift_off_time(0.3, 1e-5, 1e-3)
@@ -98,7 +98,7 @@ def scaled_drift_off_error(implementation: str, folder: Path) -> float:
     return float(np.abs(np.array(scaled) / off_time - 1.0).max())
 
 
-def overconfident_filter_ratio(implementation: str, folder: Path) -> float:
+def overconfident_filter_ratio(engine_name: str, work_folder: Path) -> float:
     """Case: a tilt filter with stated deviations of 1e-12 for angles and rates, and force noise of 1 N or 8 N. Error:
     the filter's deviations divided by the stated ones."""
     vehicle, angles = cut(load_vehicle("r19_free"), "body"), Angles(np.zeros((5000, 4)), 2e-3)
@@ -110,15 +110,15 @@ def overconfident_filter_ratio(implementation: str, folder: Path) -> float:
     return max(float(np.nan_to_num(fit.deviations / 1e-12, nan=np.inf).max()) for fit in fits)
 
 
-def flipped_bit_error(implementation: str, folder: Path) -> float:
+def flipped_bit_error(engine_name: str, work_folder: Path) -> float:
     """Case: a bit of a saved result was changed on the disk; loading must be refused. Error: largest change of the
     values."""
     heave = np.linspace(1.0, 2.0, 64)
-    Result(xr.Dataset({"z3": ("time", heave)}, {"time": ("time", np.arange(64.0))})).save(folder / "run.nc")
-    content = bytearray((folder / "run.nc").read_bytes())
+    Result(xr.Dataset({"z3": ("time", heave)}, {"time": ("time", np.arange(64.0))})).save(work_folder / "run.nc")
+    content = bytearray((work_folder / "run.nc").read_bytes())
     content[content.index(heave.tobytes()) + 100] ^= 4
-    (folder / "run.nc").write_bytes(content)
-    return float(np.abs(load(folder / "run.nc")["z3"] - heave).max())
+    (work_folder / "run.nc").write_bytes(content)
+    return float(np.abs(load(work_folder / "run.nc")["z3"] - heave).max())
 
 
 def profile_with_spike() -> Any:

@@ -90,30 +90,30 @@ def moment_error(path: Trajectory, exact_moment: np.ndarray) -> float:
     return root_mean_square((path.moment[::stride] - exact_moment)[20:])
 
 
-def recommended_error(engine: str, folder: Path) -> float:
+def recommended_error(engine_name: str, work_folder: Path) -> float:
     """Case: the enforced moment at 1 ms with the recommended settings. Error: relative rms difference from the exact
     moment."""
-    path = run(engine, guided_assembly(), 1e-3, DURATION, CONSTRAINED_INTEGRATORS[engine])
+    path = run(engine_name, guided_assembly(), 1e-3, DURATION, CONSTRAINED_INTEGRATORS[engine_name])
     return moment_error(path, enforced_truth()) / root_mean_square(enforced_truth())
 
 
-def soft_naive(folder: Path) -> str:
+def soft_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: MuJoCo's own equality constraint, with its target set before each step."""
     errors = [_soft_error(step) for step in (1e-3, 5e-4)]
     share = [error / root_mean_square(enforced_truth()) for error in errors]
     return f"MuJoCo's equality constraint: moment off by {share[0]:.0%} of its rms at 1 ms, {share[1]:.0%} at 0.5 ms"
 
 
-def _soft_error(step: float) -> float:
+def _soft_error(time_step: float) -> float:
     """Rms error (N m) of the moment by MuJoCo's soft equality constraint on the pitch joint."""
-    assembly, count = guided_assembly(), round(DURATION / step)
-    spec = specification(assembly.vehicle, settings("mujoco", step, DURATION, "Euler"))
+    assembly, count = guided_assembly(), round(DURATION / time_step)
+    spec = specification(assembly.vehicle, settings("mujoco", time_step, DURATION, "Euler"))
     spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1="chassis pitch", name2="", data=[0.0] * 12)
     model = spec.compile()
     data = mujoco.MjData(model)
     assert assembly.input is not None
-    inputs = assembly.input.sample(0.0, step, count + 1)
+    inputs = assembly.input.sample(0.0, time_step, count + 1)
     data.qpos[:], data.qvel[:] = assembly.initial[:4], assembly.initial[4:]
     moment = np.empty(count)
     for i in range(count):
@@ -122,13 +122,15 @@ def _soft_error(step: float) -> float:
         mujoco.mj_step(model, data)
         moment[i] = data.qfrc_constraint[3]
     wanted = enforced_truth()[:-1]
-    return root_mean_square((moment[:: round(1e-3 / step)] - wanted)[20:])
+    return root_mean_square((moment[:: round(1e-3 / time_step)] - wanted)[20:])
 
 
-def undamped_multiplier(engine: str, folder: Path) -> float:
+def undamped_multiplier(engine_name: str, work_folder: Path) -> float:
     """Case: generalised-alpha with spectral radius 1 in Exudyn, which must be refused; the other implementations have
     no such setting. Error: rms difference of the moment divided by its rms."""
-    path = run(engine, guided_assembly(), 1e-3, DURATION, CONSTRAINED_INTEGRATORS[engine], spectral_radius=1.0)
+    path = run(
+        engine_name, guided_assembly(), 1e-3, DURATION, CONSTRAINED_INTEGRATORS[engine_name], spectral_radius=1.0
+    )
     return moment_error(path, enforced_truth()) / root_mean_square(enforced_truth())
 
 
@@ -154,12 +156,12 @@ class InconsistentStart(UncheckedExudyn):
         self._first = np.zeros(1)
 
 
-def unchecked_exudyn_run(assembly: Assembly, step: float, integrator: str = "GeneralizedAlpha") -> Trajectory:
+def unchecked_exudyn_run(assembly: Assembly, time_step: float, integrator: str = "GeneralizedAlpha") -> Trajectory:
     """A run in Exudyn without checks, with its default spectral radius."""
-    return UncheckedExudyn(assembly, settings("exudyn", step, DURATION, integrator, spectral_radius=0.9)).run()
+    return UncheckedExudyn(assembly, settings("exudyn", time_step, DURATION, integrator, spectral_radius=0.9)).run()
 
 
-def undamped_multiplier_naive(folder: Path) -> str:
+def undamped_multiplier_naive(work_folder: Path) -> str:
     """Result without the guard, as text: Exudyn without checks and with its inconsistent start, late in the run."""
     parts = []
     for name, radius in (("GeneralizedAlpha", 1.0), ("TrapezoidalIndex2", 0.6)):
@@ -172,23 +174,23 @@ def undamped_multiplier_naive(folder: Path) -> str:
     return f"moment of {root_mean_square(enforced_truth()):.0f} N m off over the last 0.1 s: {', '.join(parts)}"
 
 
-def noise_gain(engine: str, folder: Path) -> float:
+def noise_gain(engine_name: str, work_folder: Path) -> float:
     """Case: noise of 1e-6 rad on the pitch samples. Error: enforced moment that it causes, divided by its
     finite-difference value."""
-    return _noisy_moment(engine, 1e-3)
+    return _noisy_moment(engine_name, 1e-3)
 
 
-def noise_gain_fine(engine: str, folder: Path) -> float:
+def noise_gain_fine(engine_name: str, work_folder: Path) -> float:
     """Case of ``noise_gain`` in steps of 0.125 ms."""
-    return _noisy_moment(engine, 1.25e-4)
+    return _noisy_moment(engine_name, 1.25e-4)
 
 
-def _noisy_moment(engine: str, step: float) -> float:
-    path = run(engine, guided_assembly(noise=NOISE), step, DURATION, CONSTRAINED_INTEGRATORS[engine])
+def _noisy_moment(engine_name: str, time_step: float) -> float:
+    path = run(engine_name, guided_assembly(noise=NOISE), time_step, DURATION, CONSTRAINED_INTEGRATORS[engine_name])
     return moment_error(path, enforced_truth()) / (vehicle().parameters.I * NOISE * np.sqrt(6) / SAMPLE_PERIOD**2)
 
 
-def noise_naive(folder: Path) -> str:
+def noise_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: Exudyn's default on noisy samples that are interpolated linearly."""
     base = vehicle()
     samples = prescribed_angle(SAMPLE_PERIOD * np.arange(501)) + NOISE * np.random.default_rng(5).standard_normal(501)
@@ -234,16 +236,18 @@ class StraightLinePitch:
         return self.period * np.arange(1, round(duration / self.period))
 
 
-def halving_ratio(engine: str, folder: Path) -> float:
+def halving_ratio(engine_name: str, work_folder: Path) -> float:
     """Case: pitch data sampled every 1 ms. Error: error of the moment at steps of 0.5 ms divided by that at 1 ms."""
     errors = [
-        moment_error(run(engine, guided_assembly(), h, DURATION, CONSTRAINED_INTEGRATORS[engine]), enforced_truth())
+        moment_error(
+            run(engine_name, guided_assembly(), h, DURATION, CONSTRAINED_INTEGRATORS[engine_name]), enforced_truth()
+        )
         for h in (1e-3, 5e-4)
     ]
     return errors[1] / errors[0]
 
 
-def halving_naive(folder: Path) -> str:
+def halving_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: Exudyn with noise-free samples that are interpolated linearly."""
     errors = []
     for step in (1e-3, 5e-4):
@@ -253,14 +257,14 @@ def halving_naive(folder: Path) -> str:
     return f"Exudyn on straight lines between clean samples: {errors[0]:.1f} N m at 1 ms, {errors[1]:.2g} at 0.5 ms"
 
 
-def explicit_error(engine: str, folder: Path) -> float:
+def explicit_error(engine_name: str, work_folder: Path) -> float:
     """Case: the explicit fourth-order solver of each engine with a prescribed pitch. Error: relative rms difference of
     the enforced moment."""
-    path = run(engine, guided_assembly(), 1e-3, DURATION)
+    path = run(engine_name, guided_assembly(), 1e-3, DURATION)
     return moment_error(path, enforced_truth()) / root_mean_square(enforced_truth())
 
 
-def explicit_naive(folder: Path) -> str:
+def explicit_naive(work_folder: Path) -> str:
     """Result without the guard, as text: Exudyn's explicit solver with a constraint, check bypassed."""
     path = unchecked_exudyn_run(guided_assembly(), 1e-3, "RK44")
     assert path.moment is not None
@@ -269,7 +273,7 @@ def explicit_naive(folder: Path) -> str:
     return f"Exudyn RK44 ends without a word: moment {moment:.1f} N m, pitch off by {pitch_error:.3f} rad"
 
 
-def fed_back_moment(engine: str, folder: Path) -> float:
+def fed_back_moment(engine_name: str, work_folder: Path) -> float:
     """Case: the pitch of a free run is prescribed. Error: rms of the enforced moment, which should be 0, divided by the
     rms of the inertia moment."""
     base = vehicle("asymmetric_twin")
@@ -278,21 +282,21 @@ def fed_back_moment(engine: str, folder: Path) -> float:
     free = tight_solution(driven_by_forces(base, forces), 2.5e-4, DURATION).states
     guided = setups.guided_vehicle(base, forces, smooth_pitch(free[:, 3], 2.5e-4))
     guided.initial[:] = free[0]
-    path = run(engine, guided, 2.5e-4, DURATION, CONSTRAINED_INTEGRATORS[engine])
+    path = run(engine_name, guided, 2.5e-4, DURATION, CONSTRAINED_INTEGRATORS[engine_name])
     assert path.moment is not None and guided.input is not None
     inertia = base.parameters.I * guided.input.sample(0.0, 2.5e-4, len(path.times))[:, 4]
     return root_mean_square(path.moment[40:]) / root_mean_square(inertia)
 
 
-def pitch_gap(engine: str, folder: Path) -> float:
+def pitch_gap(engine_name: str, work_folder: Path) -> float:
     """Case: prescribed pitch at 1 ms. Error: largest difference (rad) of the pitch from the prescribed one."""
     assembly = guided_assembly()
-    path = run(engine, assembly, 1e-3, DURATION, CONSTRAINED_INTEGRATORS[engine])
+    path = run(engine_name, assembly, 1e-3, DURATION, CONSTRAINED_INTEGRATORS[engine_name])
     assert assembly.input is not None
     return largest_magnitude(path.states[:, 3] - assembly.input.sample(0.0, 1e-3, len(path.times))[:, 2])
 
 
-def gap_naive(folder: Path) -> str:
+def gap_naive(work_folder: Path) -> str:
     """Difference of the pitch rate from the prescribed one, which no constraint enforces, as text."""
     assembly = guided_assembly()
     path = run("exudyn", assembly, 1e-3, DURATION, "GeneralizedAlpha")

@@ -41,12 +41,12 @@ WALK, PATHS, SAMPLES, SAMPLING_RATE = 0.5, 600, 100, 50.0
 rotation falls from 3 to 1.8."""
 
 
-def repeated_call_difference(engine: str, folder: Path) -> float:
+def repeated_call_difference(engine_name: str, work_folder: Path) -> float:
     """Case: accelerations with force noise of 800 N, evaluated forwards, backwards and twice in time. Error: largest
     difference, which must be 0."""
     base = setups.vehicle("asymmetric_twin")
     forces = static_forces(base, 200, 1e-3, noise=800.0)
-    model = build(engine, driven_by_forces(base, forces), settings(engine, 1e-3, 0.1))
+    model = build(engine_name, driven_by_forces(base, forces), settings(engine_name, 1e-3, 0.1))
     states = base.initial + 1e-3 * np.random.default_rng(3).standard_normal((40, 8))
     arguments_of_calls = [(2e-3 * i, state[:4], state[4:]) for i, state in enumerate(states)]
     once = [model.acceleration(*arguments).copy() for arguments in arguments_of_calls]
@@ -54,7 +54,7 @@ def repeated_call_difference(engine: str, folder: Path) -> float:
     return largest_magnitude(np.array(once) - reversed_answers)
 
 
-def stream_correlation(implementation: str, folder: Path) -> float:
+def stream_correlation(engine_name: str, work_folder: Path) -> float:
     """Case: noise streams of several seeds, paths and sources. Error: largest correlation between two streams, divided
     by the size that chance allows among so many pairs."""
     paths = [
@@ -73,7 +73,7 @@ def stream_correlation(implementation: str, folder: Path) -> float:
     return worst / 4.75  # one pair of 105 beyond 4.75 errors once in 5000
 
 
-def stream_piece_error(implementation: str, folder: Path) -> float:
+def stream_piece_error(engine_name: str, work_folder: Path) -> float:
     """Case: a noise stream read in pieces of odd lengths, the last first. Error: difference from the complete
     stream."""
     complete_stream, edges = (
@@ -96,7 +96,7 @@ def _one_state() -> Excitation:
     return Excitation(np.array([[-CORNER]]), np.array([[Q**0.5]]), (np.ones((1, 1)),), (0.0,))
 
 
-def road_variance_error(implementation: str, folder: Path) -> float:
+def road_variance_error(engine_name: str, work_folder: Path) -> float:
     """Case: roads with half steps of 1e-3 to 30 corner lengths. Error: difference of the variance from q / (2 corner),
     in standard errors."""
     worst = 0.0
@@ -112,12 +112,12 @@ def road_variance_error(implementation: str, folder: Path) -> float:
     return worst
 
 
-def any_step_naive(folder: Path) -> str:
+def any_step_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: variance by explicit Euler, which is 1 / (1 - part / 2) of the true one."""
     return f"explicit Euler at 0.9 corner lengths has {1.0 / (1.0 - 0.45):.2f} times the variance, at 2.5 none at all"
 
 
-def axle_delay_error(implementation: str, folder: Path) -> float:
+def axle_delay_error(engine_name: str, work_folder: Path) -> float:
     """Case: a wheelbase that is no multiple of the steps. Error: relative difference between the delay of the rear axle
     and the wheelbase; infinite if the axles' heights differ."""
     worst = 0.0
@@ -131,14 +131,14 @@ def axle_delay_error(implementation: str, folder: Path) -> float:
     return worst
 
 
-def odd_delay_naive(folder: Path) -> str:
+def odd_delay_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: distance between the axles if the delay is rounded to steps of 20 ms."""
     length, speed, step = 2.7, SPEED, 0.02
     lag = round(length / (speed * step)) * speed * step
     return f"rounded to steps of 20 ms the axles stand {lag:.2f} m apart in place of {length} m"
 
 
-def attitude_error(implementation: str, folder: Path) -> float:
+def attitude_error(engine_name: str, work_folder: Path) -> float:
     """Case: a noisy gyro on a rotating body. Error: difference of the mean trace of its attitude error from 3 exp(-s^2
     t), in standard errors."""
     rates = np.tile([0.0, 0.0, 2.0], (SAMPLES, 1))
@@ -150,7 +150,7 @@ def attitude_error(implementation: str, folder: Path) -> float:
     return abs(float(traces.mean()) - wanted) / (float(traces.std()) / PATHS**0.5)
 
 
-def attitude_naive(folder: Path) -> str:
+def attitude_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: norm of a quaternion that is integrated by explicit Euler."""
     turns = WALK / SAMPLING_RATE**0.5 * np.stack([normal_samples(5, path, SAMPLES, 3) for path in range(PATHS)], axis=1)
     q = euler_quaternions(turns, np.array([1.0, 0.0, 0.0, 0.0]))
@@ -160,7 +160,7 @@ def attitude_naive(folder: Path) -> str:
     )
 
 
-def growth_law_error(implementation: str, folder: Path) -> float:
+def growth_law_error(engine_name: str, work_folder: Path) -> float:
     """Case: the pitch variance for 2 lambda t of 1e-12 to 600, below and above the switch to its series. Error:
     relative difference from values with 60 digits."""
     worst = 0.0
@@ -177,16 +177,16 @@ def _exact_law(x: Decimal) -> float:
         return float(Decimal("0.7") * 8 / 3 * 6 * (sinh - x) / x**3)
 
 
-def no_growth_naive(folder: Path) -> str:
+def no_growth_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: the variance without growth by the formula as printed."""
     x = 1e-8
     return f"the closed law as printed is {6.0 * (np.sinh(x) - x) / x**3:.2f} times the truth at 2 lambda t = 1e-8"
 
 
-def negative_eigenvalue_share(implementation: str, folder: Path) -> float:
+def negative_eigenvalue_share(engine_name: str, work_folder: Path) -> float:
     """Case: the half car's covariance at 2 to 60 m/s. Error: magnitude of its most negative eigenvalue divided by the
     largest, with states scaled by their deviations."""
-    vehicle = linear_vehicle(load_vehicle("half_car"), implementation)
+    vehicle = linear_vehicle(load_vehicle("half_car"), engine_name)
     worst = 0.0
     for speed in (2.0, 7.0, 20.0, 60.0):
         half_car = vehicle(speed)

@@ -23,8 +23,8 @@ def planted_fault_case(
     """Case: a recording with one planted fault. Error: relative error of the size that the check finds; infinite unless
     ``check`` reports the fault first, and all findings name ``expected_place``."""
 
-    def error(implementation: str, folder: Path) -> float:
-        findings = bench.planted_findings(bench.measurement(road=ROAD), folder, spoil, **faults)
+    def error(engine_name: str, work_folder: Path) -> float:
+        findings = bench.planted_findings(bench.measurement(road=ROAD), work_folder, spoil, **faults)
         if (
             not findings
             or findings[0].check != check
@@ -36,9 +36,9 @@ def planted_fault_case(
     return error
 
 
-def clean_recording_findings(implementation: str, folder: Path) -> float:
+def clean_recording_findings(engine_name: str, work_folder: Path) -> float:
     """Case: a recording without faults. Error: number of errors and doubts that the check reports."""
-    return float(len(bench.planted_findings(bench.measurement(road=ROAD), folder)))
+    return float(len(bench.planted_findings(bench.measurement(road=ROAD), work_folder)))
 
 
 CASES = (

@@ -37,11 +37,11 @@ from validation.ride.rides import ROAD_INTENSITY, largest_relative_error, one_tr
 Change = Callable[[dict[str, Any]], object]
 
 
-def damped_tyre_error(implementation: str, folder: Path) -> float:
+def damped_tyre_error(engine_name: str, work_folder: Path) -> float:
     """Relative error of the first two outputs' variances with a damped tyre, against quadrature; infinite unless only
     the tyre force is reported as infinite."""
     vehicle, road = (
-        linear_equations(quarter_car(*QUARTER_CAR_NUMBERS, c_t=100.0), implementation),
+        linear_equations(quarter_car(*QUARTER_CAR_NUMBERS, c_t=100.0), engine_name),
         one_track((0.0,), 0.3),
     )
     covariance = stationary_covariance(vehicle_with_road(vehicle, road, SPEED))
@@ -50,7 +50,7 @@ def damped_tyre_error(implementation: str, folder: Path) -> float:
     return largest_relative_error(covariance.variance[:2], variances_by_quadrature(vehicle, road, SPEED).variance[:2])
 
 
-def damped_tyre_naive(folder: Path) -> str:
+def damped_tyre_naive(work_folder: Path) -> str:
     """Result without the guard, as text: variances by the Lyapunov equation if the white noise that reaches outputs
     directly is ignored."""
     system = vehicle_with_road(
@@ -60,20 +60,20 @@ def damped_tyre_naive(folder: Path) -> str:
     return f"C P C' gives the tyre force a standard deviation of {stationary_covariance(silent).deviation[2]:.0f} N"
 
 
-def free_car_error(implementation: str, folder: Path) -> float:
+def free_car_error(engine_name: str, work_folder: Path) -> float:
     """Relative error of R19-free's acceleration variances, with independent axles, against the exact covariance one
     hour after rest."""
-    vehicle = linear_equations(load_vehicle("r19_free"), implementation)
+    vehicle = linear_equations(load_vehicle("r19_free"), engine_name)
     system = vehicle_with_road(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
     rows = [i for i, output in enumerate(vehicle.outputs) if "acceleration" in output.kind]
     covariance, wanted = stationary_covariance(system), variances_after_hours(system)[0]
     return largest_relative_error(covariance.variance[rows], wanted[rows])
 
 
-def growth_rate_error(implementation: str, folder: Path) -> float:
+def growth_rate_error(engine_name: str, work_folder: Path) -> float:
     """Relative error of the growth rates of heading variance (as t) and lateral position variance (as t^3), against the
     exact covariance after 1 and 2 hours."""
-    vehicle = linear_equations(roll_steered_vehicle(), implementation)
+    vehicle = linear_equations(roll_steered_vehicle(), engine_name)
     system = vehicle_with_road(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
     covariance = stationary_covariance(system)
     if covariance.status != (DIFFUSING, DIFFUSING) or covariance.power.tolist() != [1, 3]:
@@ -86,10 +86,10 @@ def growth_rate_error(implementation: str, folder: Path) -> float:
 def undamped_case(corner: float) -> Callable[..., float]:
     """Case: a body on an undamped tyre. Error: that of the growth rates of its variances, against S(w) / 2 w^2."""
 
-    def error(implementation: str, folder: Path) -> float:
+    def error(engine_name: str, work_folder: Path) -> float:
         undamped_car = replace(single_body(300.0, 2e5, 0.0), springs=())
         covariance = stationary_covariance(
-            vehicle_with_road(linear_equations(undamped_car, implementation), one_track((0.0,), corner), SPEED)
+            vehicle_with_road(linear_equations(undamped_car, engine_name), one_track((0.0,), corner), SPEED)
         )
         if covariance.status != (DIFFUSING, DIFFUSING):
             return np.inf
@@ -100,13 +100,13 @@ def undamped_case(corner: float) -> Callable[..., float]:
     return error
 
 
-def triple_pole_error(implementation: str, folder: Path) -> float:
+def triple_pole_error(engine_name: str, work_folder: Path) -> float:
     """Case: a critically damped body at the frequency of the road's corner. Error: relative difference of the variances
     from 3 q w^3 / 16 and 3 q / 16 w."""
     w = 6.0
     covariance = stationary_covariance(
         vehicle_with_road(
-            linear_equations(single_body(300.0, 300.0 * w**2, 600.0 * w), implementation),
+            linear_equations(single_body(300.0, 300.0 * w**2, 600.0 * w), engine_name),
             one_track((0.0,), w / SPEED),
             SPEED,
         )
@@ -114,7 +114,7 @@ def triple_pole_error(implementation: str, folder: Path) -> float:
     return largest_relative_error(covariance.variance, 3.0 * ROAD_INTENSITY * SPEED / 16.0 * np.array([w**3, 1.0 / w]))
 
 
-def triple_naive(folder: Path) -> str:
+def triple_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: condition number of the eigenvectors in this case."""
     system = vehicle_with_road(
         linear_equations(single_body(300.0, 10800.0, 3600.0), "reference"), one_track((0.0,), 0.3), SPEED
@@ -124,17 +124,17 @@ def triple_naive(folder: Path) -> str:
     return f"sums over eigenvectors have a condition of {condition:.0e} there"
 
 
-def unstable_car(implementation: str, folder: Path) -> float:
+def unstable_car(engine_name: str, work_folder: Path) -> float:
     """Case: a damper with the wrong sign must be refused, with the growth rate of the fastest motion."""
-    return _refused_by_growth(linear_equations(quarter_car(300.0, 40.0, 2e4, -1500.0, 2e5), implementation))
+    return _refused_by_growth(linear_equations(quarter_car(300.0, 40.0, 2e4, -1500.0, 2e5), engine_name))
 
 
-def toppling_car(implementation: str, folder: Path) -> float:
+def toppling_car(engine_name: str, work_folder: Path) -> float:
     """Case: a body 30 m above its springs must be refused, with the rate at which it topples under gravity."""
     car = load_vehicle("seven_freedoms")
     x, y, _ = car.bodies[0].position
     tall = replace(car, gravity=9.81, bodies=(replace(car.bodies[0], position=(x, y, 30.0)), *car.bodies[1:]))
-    return _refused_by_growth(linear_equations(tall, implementation))
+    return _refused_by_growth(linear_equations(tall, engine_name))
 
 
 def _refused_by_growth(vehicle: LinearVehicle) -> float:
@@ -154,17 +154,17 @@ def _refused_by_growth(vehicle: LinearVehicle) -> float:
     raise refusal
 
 
-def long_delay_error(implementation: str, folder: Path) -> float:
+def long_delay_error(engine_name: str, work_folder: Path) -> float:
     """Case: a delay of 26,000 s between the axles. Error: relative difference from independent axles."""
-    vehicle = linear_equations(load_vehicle("half_car"), implementation)
+    vehicle = linear_equations(load_vehicle("half_car"), engine_name)
     late, independent = (_deviations_of_ride(vehicle, 1e-4, word) for word in ("delayed", "uncorrelated"))
     return largest_relative_error(late, independent)
 
 
-def no_delay_error(implementation: str, folder: Path) -> float:
+def no_delay_error(engine_name: str, work_folder: Path) -> float:
     """Case: two axles at the same x, without delay. Error: relative difference of the deviations from a common
     input."""
-    vehicle = linear_equations(load_vehicle("half_car"), implementation)
+    vehicle = linear_equations(load_vehicle("half_car"), engine_name)
     at_one_place = replace(vehicle, wheels=tuple(replace(wheel, x=0.0) for wheel in vehicle.wheels))
     delayed, equal = (_deviations_of_ride(at_one_place, SPEED, word) for word in ("delayed", "equal"))
     return largest_relative_error(delayed, equal)
@@ -176,7 +176,7 @@ def _deviations_of_ride(vehicle: LinearVehicle, speed: float = SPEED, axles: str
     ).deviation
 
 
-def mirror_error(implementation: str, folder: Path) -> float:
+def mirror_error(engine_name: str, work_folder: Path) -> float:
     """Case: the left springs, then the right springs, are twice as stiff. Error: relative difference of the deviations
     of outputs on the centre line."""
     car = load_vehicle("seven_freedoms")
@@ -185,15 +185,15 @@ def mirror_error(implementation: str, folder: Path) -> float:
         springs = tuple(
             replace(s, stiffness=s.stiffness * (2.0 if side * s.first_point[1] > 0 else 1.0)) for s in car.springs
         )
-        vehicle = linear_equations(replace(car, springs=springs), implementation)
+        vehicle = linear_equations(replace(car, springs=springs), engine_name)
         rows = [o.name == "body centre" or "angular" in o.kind for o in vehicle.outputs]
         deviations.append(_deviations_of_ride(vehicle)[rows])
     return largest_relative_error(deviations[0], deviations[1])
 
 
-def slow_weighting_error(implementation: str, folder: Path) -> float:
+def slow_weighting_error(engine_name: str, work_folder: Path) -> float:
     """Relative error of the body acceleration's variance weighted by Wk at 1 mm/s, against quadrature."""
-    vehicle = linear_equations(quarter_car(*QUARTER_CAR_NUMBERS), implementation)
+    vehicle = linear_equations(quarter_car(*QUARTER_CAR_NUMBERS), engine_name)
     road, name = one_track((0.0,), 0.3), vehicle.outputs[0].name
     variance = stationary_covariance(
         system_with_weightings(vehicle_with_road(vehicle, road, 1e-3), {name: "Wk"})
@@ -202,18 +202,18 @@ def slow_weighting_error(implementation: str, folder: Path) -> float:
     return largest_relative_error(variance, wanted)
 
 
-def standstill_error(implementation: str, folder: Path) -> float:
+def standstill_error(engine_name: str, work_folder: Path) -> float:
     """Case: a drive that starts and ends with a stop. Error: largest relative change of the road height's variance
     under each wheel."""
-    vehicle = linear_equations(load_vehicle("half_car"), implementation)
+    vehicle = linear_equations(load_vehicle("half_car"), engine_name)
     drive = SpeedProfile((0.0, 0.1, 1.1, 1.6, 2.0), (0.0, 0.0, 10.0, 0.0, 0.0))
     height = varying_speed(vehicle, paper_road(vehicle.wheels), drive).height
     return largest_relative_error((height / height[0]) ** 2, 1.0)
 
 
-def invalid_speeds(implementation: str, folder: Path) -> float:
+def invalid_speeds(engine_name: str, work_folder: Path) -> float:
     """Case: speeds of -1, NaN, infinity and 0 must each be refused."""
-    vehicle = linear_equations(load_vehicle("half_car"), implementation)
+    vehicle = linear_equations(load_vehicle("half_car"), engine_name)
     for speed in (-1.0, float("nan"), float("inf"), 0.0):
         try:
             _deviations_of_ride(vehicle, speed)
@@ -227,7 +227,7 @@ def invalid_speeds(implementation: str, folder: Path) -> float:
 def wrong_entry_case(change: Change, expected_place: str) -> Callable[..., float]:
     """Case: the half car's file with a wrong entry must be refused with the entry's name."""
 
-    def error(implementation: str, folder: Path) -> float:
+    def error(engine_name: str, work_folder: Path) -> float:
         table = parse(SHIPPED_FOLDER / "half_car.toml")
         change(table)
         try:
@@ -236,7 +236,7 @@ def wrong_entry_case(change: Change, expected_place: str) -> Callable[..., float
             if expected_place not in refusal.place:
                 return np.inf
             raise
-        return float(np.isfinite(_deviations_of_ride(linear_equations(vehicle, implementation))).all()) + 1.0
+        return float(np.isfinite(_deviations_of_ride(linear_equations(vehicle, engine_name))).all()) + 1.0
 
     return error
 

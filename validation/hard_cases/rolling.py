@@ -31,10 +31,10 @@ MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
 
 
 def built_wheelset(
-    implementation: str, wheelset: Wheelset = CHOSEN_WHEELSET, speed: float = 40.0, **options: Any
+    engine_name: str, wheelset: Wheelset = CHOSEN_WHEELSET, speed: float = 40.0, **options: Any
 ) -> Equations:
     """Equations of motion of a wheelset in an implementation, with few contact cells."""
-    return KINDS[implementation](wheelset, speed, **({"cells": 7} | options))
+    return KINDS[engine_name](wheelset, speed, **({"cells": 7} | options))
 
 
 def displaced_state(equations: Equations, **values: float) -> np.ndarray:
@@ -55,39 +55,39 @@ def beyond_friction(motion: Motion, mu: float) -> float:
     return float(np.max(force[loaded] / bound[loaded] - 1.0, initial=0.0))
 
 
-def creep_at_standstill(implementation: str, folder: Path) -> float:
+def creep_at_standstill(engine_name: str, work_folder: Path) -> float:
     """Case: a wheelset stands under a lateral force of a third of the friction limit. Error: its lateral creep speed
     (m/s)."""
-    equations = built_wheelset(implementation, HEAVY_WHEELSET, 0.0, lean=0.1)
+    equations = built_wheelset(engine_name, HEAVY_WHEELSET, 0.0, lean=0.1)
     motion = equations.run(equations.rest, 0.04, 8e-5, 250)
     return float(abs(motion.states[-1, eq.Y] - motion.states[-2, eq.Y]) / 0.02)
 
 
-def standstill_naive(folder: Path) -> str:
+def standstill_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: creepage by a speed of travel that is not regularised."""
     with np.errstate(divide="ignore"):
         return f"creepage by the speed of travel: {np.float64(1e-4) / np.float64(0.0)}"
 
 
-def reversal_jump(implementation: str, folder: Path) -> float:
+def reversal_jump(engine_name: str, work_folder: Path) -> float:
     """Case: the speed passes 0 and the limits of its regularisation. Error: largest jump of an acceleration divided by
     mu N / m."""
     jumps = []
     for middle in (-wf.REGULARISED_SPEED, 0.0, wf.REGULARISED_SPEED):
         rates_below, rates_above = (
-            built_wheelset(implementation, CHOSEN_WHEELSET, middle + speed_offset) for speed_offset in (-1e-9, 1e-9)
+            built_wheelset(engine_name, CHOSEN_WHEELSET, middle + speed_offset) for speed_offset in (-1e-9, 1e-9)
         )
         state = np.array([2e-3, 5e-5, 1e-4, 1e-3, 0.0, 1e-3, 0.0, 1e-3, 1e-3, 0.1])
         jumps.append(np.abs(rates_above.rates(state) - rates_below.rates(state)).max())
     return float(max(jumps) * CHOSEN_WHEELSET.mass / (CHOSEN_WHEELSET.friction * CHOSEN_WHEELSET.load))
 
 
-def gain_through_zero(implementation: str, folder: Path) -> float:
+def gain_through_zero(engine_name: str, work_folder: Path) -> float:
     """Case: runs at speeds that fall through 0. Error: relative gain of the kinetic energy of lateral motion and
     yaw."""
     state, energies = None, []
     for speed in np.linspace(0.06, -0.06, 7):
-        equations = built_wheelset(implementation, HEAVY_WHEELSET, float(speed))
+        equations = built_wheelset(engine_name, HEAVY_WHEELSET, float(speed))
         state = displaced_state(equations, Y_RATE=2e-3, YAW_RATE=2e-3) if state is None else state
         state[eq.SPIN] = -speed / HEAVY_WHEELSET.radius
         motion = equations.run(state, 0.002, 8e-5)
@@ -108,11 +108,11 @@ def total_energy(motion: Motion, w: Wheelset) -> np.ndarray:
     return 0.5 * (w.mass * (vy**2 + vz**2) + turning) - w.load * z + pressed
 
 
-def gain_of_fall(implementation: str, folder: Path, **displacements: float) -> float:
+def gain_of_fall(engine_name: str, work_folder: Path, **displacements: float) -> float:
     """Case: an elastic, frictionless wheelset falls on its rails. Error: gained energy divided by that of a fall by 1
     mm."""
     elastic = FREE_WHEELSET.changed(friction=0.0, contact_damping=0.0, flange_clearance=0.1)
-    wheelset = built_wheelset(implementation, elastic)
+    wheelset = built_wheelset(engine_name, elastic)
     motion = wheelset.run(displaced_state(wheelset, **displacements), 0.06, 5e-5)
     loads = motion.contacts["load"]
     if not ((loads == 0.0).any(axis=0) & (loads > 0.0).any(axis=0)).all():
@@ -121,10 +121,10 @@ def gain_of_fall(implementation: str, folder: Path, **displacements: float) -> f
     return float((gained - gained[0]).max() / (elastic.load * 1e-3))
 
 
-def bounce_height(implementation: str, folder: Path) -> float:
+def bounce_height(engine_name: str, work_folder: Path) -> float:
     """Case: a rolling wheelset with friction and damping is released 1 mm above its rails. Error: height by which it
     rises above the release point, divided by 1 mm."""
-    wheelset = built_wheelset(implementation, FREE_WHEELSET)
+    wheelset = built_wheelset(engine_name, FREE_WHEELSET)
     start = displaced_state(wheelset, Z=-1e-3)
     motion = wheelset.run(start, 0.2, 1e-4)
     if beyond_friction(motion, FREE_WHEELSET.friction) > 1e-12:
@@ -132,11 +132,11 @@ def bounce_height(implementation: str, folder: Path) -> float:
     return float(max(0.0, (start[eq.Z] - motion.states[:, eq.Z].min()) / 1e-3))
 
 
-def light_wheelset_load(implementation: str, folder: Path, mass: float) -> float:
+def light_wheelset_load(engine_name: str, work_folder: Path, mass: float) -> float:
     """Case: a wheelset of a toy's mass at rest. Error: relative difference of its wheel loads from its weight; infinite
     if creep forces exceed the friction limit."""
     toy = FREE_WHEELSET.changed(mass=mass, load=mass * GRAVITY, spin_inertia=0.1 * mass, yaw_inertia=mass)
-    wheelset = built_wheelset(implementation, toy)
+    wheelset = built_wheelset(engine_name, toy)
     motion = wheelset.run(wheelset.rest, 2e-3, 2e-4)
     if beyond_friction(motion, toy.friction) > 1e-12:
         return np.inf
@@ -145,19 +145,19 @@ def light_wheelset_load(implementation: str, folder: Path, mass: float) -> float
     return float(abs(vertical_force.sum() / toy.load - 1.0))
 
 
-def friction_excess(implementation: str, folder: Path) -> float:
+def friction_excess(engine_name: str, work_folder: Path) -> float:
     """Case: friction coefficients from 0 to 1. Error: largest relative excess of a creep force over mu N."""
     shares = []
     for mu in (0.0, 1e-6, 1e-3, 1.0):
-        wheelset = built_wheelset(implementation, CHOSEN_WHEELSET.changed(friction=mu), 60.0)
+        wheelset = built_wheelset(engine_name, CHOSEN_WHEELSET.changed(friction=mu), 60.0)
         shares.append(beyond_friction(wheelset.run(displaced_state(wheelset, Y=3e-3, YAW=3e-3), 0.05, STEP / 4.0), mu))
     return max(shares)
 
 
-def spin_force(implementation: str, folder: Path) -> float:
+def spin_force(engine_name: str, work_folder: Path) -> float:
     """Case: steep cones roll without displacement, in pure spin. Error: sum of both lateral forces divided by mu N, and
     moments about the axle divided by mu N r."""
-    wheelset = built_wheelset(implementation, STEEP_WHEELSET, 20.0)
+    wheelset = built_wheelset(engine_name, STEEP_WHEELSET, 20.0)
     contact = wheelset.run(wheelset.rest, 1e-4, 1e-4).contacts[0]
     bound = STEEP_WHEELSET.friction * contact["load"]
     if np.abs(contact["fy"] / bound).min() < 0.1:
@@ -166,44 +166,44 @@ def spin_force(implementation: str, folder: Path) -> float:
     return float(max(np.abs(moment / (bound * STEEP_WHEELSET.radius)).max(), abs(contact["fy"].sum()) / bound[0]))
 
 
-def halving_error(implementation: str, folder: Path, wheelset: Wheelset, speed: float, step: float) -> float:
+def halving_error(engine_name: str, work_folder: Path, wheelset: Wheelset, speed: float, time_step: float) -> float:
     """Case: a displaced wheelset at a speed (m/s). Error: largest difference (m, rad) from half the step (s)."""
-    equations = built_wheelset(implementation, wheelset, speed)
+    equations = built_wheelset(engine_name, wheelset, speed)
     start = equations.displaced_state(1e-3)
-    ends = [equations.run(start, 100 * step, h).states[-1] for h in (step, step / 2.0)]
+    ends = [equations.run(start, 100 * time_step, h).states[-1] for h in (time_step, time_step / 2.0)]
     return float(np.abs(ends[1] - ends[0])[: eq.ANGLE].max())
 
 
-def crawling_error(implementation: str, folder: Path) -> float:
+def crawling_error(engine_name: str, work_folder: Path) -> float:
     """Case: a speed of 1e-6 m/s. Error: relative difference of the displacement from a standing wheelset's."""
-    rest_state = built_wheelset(implementation, HEAVY_WHEELSET, 0.0).rest
+    rest_state = built_wheelset(engine_name, HEAVY_WHEELSET, 0.0).rest
     runs = (
-        built_wheelset(implementation, HEAVY_WHEELSET, speed, lean=0.1).run(rest_state, 0.01, 8e-5)
+        built_wheelset(engine_name, HEAVY_WHEELSET, speed, lean=0.1).run(rest_state, 0.01, 8e-5)
         for speed in (0.0, 1e-6)
     )
     still, slow = (motion.states[-1, eq.Y] for motion in runs)
     return float(abs(slow / still - 1.0))
 
 
-def centred_motion(implementation: str, folder: Path) -> float:
+def centred_motion(engine_name: str, work_folder: Path) -> float:
     """Case: a wheelset in the middle of the track above its critical speed. Error: displacement, roll and yaw, which
     must stay 0."""
-    equations = built_wheelset(implementation, CHOSEN_WHEELSET, 80.0)
+    equations = built_wheelset(engine_name, CHOSEN_WHEELSET, 80.0)
     return float(np.abs(equations.run(equations.rest, 0.3, STEP).states[:, [eq.Y, eq.ROLL, eq.YAW]]).max())
 
 
-def mirror_error(implementation: str, folder: Path) -> float:
+def mirror_error(engine_name: str, work_folder: Path) -> float:
     """Case: a start and its mirror image, with one wheel in the air. Error: difference of the mirrored paths."""
-    equations = built_wheelset(implementation)
+    equations = built_wheelset(engine_name)
     start = displaced_state(equations, Y=2e-3, Z=-7e-4, ROLL=1e-3, YAW=2e-3, ROLL_RATE=0.05, YAW_RATE=0.1)
     straight, other_path = (equations.run(state, 0.05, 1e-4).states for state in (start, MIRROR * start))
     return float(np.abs(straight - MIRROR * other_path).max())
 
 
-def refusal_error(implementation: str, folder: Path, expected_place: str, run: Callable[[str], Any]) -> float:
+def refusal_error(engine_name: str, work_folder: Path, expected_place: str, run: Callable[[str], Any]) -> float:
     """Case: ``run`` must be refused with the name ``expected_place``. Error: infinite if it is not."""
     try:
-        run(implementation)
+        run(engine_name)
     except InputError as refusal:
         if expected_place in refusal.place:
             raise
@@ -211,24 +211,24 @@ def refusal_error(implementation: str, folder: Path, expected_place: str, run: C
 
 
 def moved_run(
-    implementation: str,
+    engine_name: str,
     *,
     duration: float = 0.01,
-    step: float = STEP,
+    time_step: float = STEP,
     stride: int = 1,
     speed: float = 40.0,
     **displacements: float,
 ) -> Motion:
     """Motion of the chosen wheelset that starts displaced from rest; speed in m/s, duration and step in s."""
-    wheelset = built_wheelset(implementation, speed=speed)
-    return wheelset.run(displaced_state(wheelset, **displacements), duration, step, stride)
+    wheelset = built_wheelset(engine_name, speed=speed)
+    return wheelset.run(displaced_state(wheelset, **displacements), duration, time_step, stride)
 
 
-def failing_run(implementation: str, folder: Path, **displacements: Any) -> float:
+def failing_run(engine_name: str, work_folder: Path, **displacements: Any) -> float:
     """Case: a run that must fail within its first half, with the time in the message. Error: infinite if it does
     not."""
     try:
-        moved_run(implementation, duration=0.1, **displacements)
+        moved_run(engine_name, duration=0.1, **displacements)
     except RunFailed as failure:
         if failure.time is not None and 0.0 <= failure.time < 0.05:
             raise
@@ -238,7 +238,7 @@ def failing_run(implementation: str, folder: Path, **displacements: Any) -> floa
 LANDING: dict[str, Any] = {"Z": -5e-3, "Y_RATE": 0.01, "YAW": 1e-3}
 
 
-def too_large_naive(folder: Path) -> str:
+def too_large_naive(work_folder: Path) -> str:
     """Result without the guard, as text: difference of a path without the check of loads from the path with an eighth
     of the step."""
     equations, ends = built_wheelset("reference"), []
@@ -404,7 +404,7 @@ CASES = (
             REFUSED,
         )
         for name, place, run in (
-            ("step of 4 ms on rails", "step", partial(moved_run, step=4e-3, duration=0.04)),
+            ("step of 4 ms on rails", "step", partial(moved_run, time_step=4e-3, duration=0.04)),
             ("step of 0.5 ms at standstill", "step", partial(moved_run, speed=0.0)),
             ("wheelset somewhere unknown", "state[0]", partial(moved_run, Y=np.nan)),
             ("spin that is infinite", "state[9]", partial(moved_run, SPIN=np.inf)),

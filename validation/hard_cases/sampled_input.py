@@ -36,13 +36,15 @@ from validation.hard_cases.setups import (
 )
 
 
-def momentum_error(engine: str, interpolation: str, values: np.ndarray, sample_period: float, step: float) -> float:
+def momentum_error(
+    engine_name: str, interpolation: str, values: np.ndarray, sample_period: float, time_step: float
+) -> float:
     """Error of the momentum sum m z' against the exact impulse of the wheel forces, divided by the largest impulse."""
     base = vehicle("asymmetric_twin")
     forces = Sampled(values, sample_period, held=interpolation == "held")
-    steps = round((len(values) - 1) * sample_period / step)
-    path = run(engine, setups.driven_by_forces(base, forces), step, steps * step)
-    p, stride = base.parameters, round(sample_period / step)
+    steps = round((len(values) - 1) * sample_period / time_step)
+    path = run(engine_name, setups.driven_by_forces(base, forces), time_step, steps * time_step)
+    p, stride = base.parameters, round(sample_period / time_step)
     masses = np.array([p.m1, p.m2, p.m3])
     total = values.sum(axis=1)
     impulse_so_far = np.concatenate(([0.0], np.cumsum(total[:-1] * sample_period)))
@@ -51,13 +53,13 @@ def momentum_error(engine: str, interpolation: str, values: np.ndarray, sample_p
     return largest_magnitude(path.states[::stride, 4:7] @ masses - truth) / largest_magnitude(impulse)
 
 
-def ramp_momentum_error(engine: str, folder: Path) -> float:
+def ramp_momentum_error(engine_name: str, work_folder: Path) -> float:
     """Case: forces that rise by 1 N per sample, so that a wrong sample shows. Error: that of ``momentum_error``."""
     values = np.add.outer(np.arange(1001.0), np.array([0.0, 100.0]))
-    return max(momentum_error(engine, "held", values, period, period) for period in (1e-3, 2e-3))
+    return max(momentum_error(engine_name, "held", values, period, period) for period in (1e-3, 2e-3))
 
 
-def ramp_naive(folder: Path) -> str:
+def ramp_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: share of steps that read the wrong sample if the accumulated time is
     truncated."""
     shares = []
@@ -71,14 +73,14 @@ def ramp_naive(folder: Path) -> str:
     )
 
 
-def noise_impulse_error(engine: str, folder: Path) -> float:
+def noise_impulse_error(engine_name: str, work_folder: Path) -> float:
     """Case: noisy wheel forces, held or interpolated between samples, with two steps per sample. Error: the larger
     ``momentum_error`` of the two."""
     values = 3800.0 + 800.0 * np.random.default_rng(3).standard_normal((251, 2))
-    return max(momentum_error(engine, rule, values, 2e-3, 1e-3) for rule in ("held", "linear"))
+    return max(momentum_error(engine_name, rule, values, 2e-3, 1e-3) for rule in ("held", "linear"))
 
 
-def impulse_naive(folder: Path) -> str:
+def impulse_naive(work_folder: Path) -> str:
     """Difference of the final pitch between held and linearly interpolated forces, as text."""
     base = vehicle()
     values = static_forces(base, 1002, 2e-3, noise=800.0).values
@@ -89,13 +91,13 @@ def impulse_naive(folder: Path) -> str:
     return f"held and linear end {abs(ends[0] - ends[1]) / abs(ends[0]):.1%} apart in pitch: half a sample of shift"
 
 
-def halving_ratio(engine: str, folder: Path) -> float:
+def halving_ratio(engine_name: str, work_folder: Path) -> float:
     """Case: held noise sampled every 2 ms, in steps of 1 and 0.5 ms. Error: error of the finer steps, against the
     matrix exponential, divided by that of the coarser."""
     base = vehicle(geometry="linear")
     forces = static_forces(base, 250, 2e-3, noise=500.0)
     truth = exact_states(setups.driven_by_forces(base, forces), 2e-3, 250, forces.values)
-    coarse, fine = (run(engine, setups.driven_by_forces(base, forces), h, 0.5).states for h in (1e-3, 5e-4))
+    coarse, fine = (run(engine_name, setups.driven_by_forces(base, forces), h, 0.5).states for h in (1e-3, 5e-4))
     return largest_magnitude(fine[::4] - truth) / largest_magnitude(coarse[::2] - truth)
 
 
@@ -110,7 +112,7 @@ class StageTimeSamples(Sampled):
         return self.values[np.floor(periods + SNAP_SHARE).astype(int).clip(0, len(self.values) - 1)]
 
 
-def halving_naive(folder: Path) -> str:
+def halving_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: pitch under a force that is read at the time of each stage."""
     base = vehicle(geometry="linear")
     values = static_forces(base, 251, 2e-3, noise=500.0).values
@@ -133,39 +135,39 @@ def _profile_points() -> tuple[np.ndarray, np.ndarray]:
     return s, -0.02 * rise * np.sin(1.7 * s) - 0.004 * rise * np.sin(7.1 * s)
 
 
-def observed_order(engine: str, profile: SplineProfile) -> float:
+def observed_order(engine_name: str, profile: SplineProfile) -> float:
     """Observed order of convergence over steps of 2, 1 and 0.5 ms, from the largest state differences over 1 s."""
     base = vehicle()
     road = base.with_input("road", RoadUnderWheels(profile, 20.0, 2.0))
-    runs = [run(engine, road, h, 1.0).states for h in (2e-3, 1e-3, 5e-4)]
+    runs = [run(engine_name, road, h, 1.0).states for h in (2e-3, 1e-3, 5e-4)]
     first, second = runs[1][::2] - runs[0], runs[2][::4] - runs[1][::2]
     return float(np.log2(largest_magnitude(first) / largest_magnitude(second)))
 
 
-def orders_lost(engine: str, folder: Path) -> float:
+def orders_lost(engine_name: str, work_folder: Path) -> float:
     """Case: a road that is a C2 spline through its points. Error: 4 minus the observed order of convergence."""
-    return max(0.0, 4.0 - observed_order(engine, SplineProfile.through(*_profile_points())))
+    return max(0.0, 4.0 - observed_order(engine_name, SplineProfile.through(*_profile_points())))
 
 
-def polyline_naive(folder: Path) -> str:
+def polyline_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: observed order on straight lines through the points."""
     observed = observed_order("reference", PolylineProfile.through(*_profile_points()))
     return f"straight lines through the same points: order {observed:.1f}"
 
 
-def adaptive_noise_error(engine: str, folder: Path) -> float:
+def adaptive_noise_error(engine_name: str, work_folder: Path) -> float:
     """Case: an adaptive solver on held noise must restart at each sample, or be refused. Error: that of the states."""
-    name = {"reference": "DOP853"}.get(engine, "DOPRI5")
-    build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
+    name = {"reference": "DOP853"}.get(engine_name, "DOPRI5")
+    build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine_name: {"integrator": name}}})
     base = vehicle(geometry="linear")
     forces = static_forces(base, 200, 1e-3, noise=500.0)
-    path = run(engine, setups.driven_by_forces(base, forces), 1e-3, 0.2, name)
+    path = run(engine_name, setups.driven_by_forces(base, forces), 1e-3, 0.2, name)
     return largest_magnitude(
         path.states - exact_states(setups.driven_by_forces(base, forces), 1e-3, 200, forces.values)
     )
 
 
-def noise_adaptive_naive(folder: Path) -> str:
+def noise_adaptive_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: error of scipy's RK45 that integrates across the jumps of noisy forces."""
     base = vehicle(geometry="linear")
     forces = static_forces(base, 200, 1e-3, noise=500.0)
@@ -182,11 +184,11 @@ def noise_adaptive_naive(folder: Path) -> str:
     return f"RK45 straight across the jumps: {solution.nfev} force calls for 200 samples, error {error:.0e}"
 
 
-def damaged_file(engine: str, folder: Path) -> float:
+def damaged_file(engine_name: str, work_folder: Path) -> float:
     """Case: the 58th sample of a force file is NaN; it must be refused with its line. Error: largest state."""
     values = np.full(301, 3825.9)
     values[57] = np.nan
-    write_time_series(folder / "forces.csv", {"front": ("N", values), "rear": ("N", values)}, 1e-3)
+    write_time_series(work_folder / "forces.csv", {"front": ("N", values), "rear": ("N", values)}, 1e-3)
     scene = build_scene(
         {
             "title": "",
@@ -194,29 +196,29 @@ def damaged_file(engine: str, folder: Path) -> float:
             "effects": {"wheel_forces": {"file": "forces.csv", "interpolation": "held"}},
         },
         "scene.toml",
-        folder,
+        work_folder,
     )
     try:
-        return largest_magnitude(simulate(scene, engine).states)
+        return largest_magnitude(simulate(scene, engine_name).states)
     except InputError as error:
         if "line 59" not in str(error):
             raise AssertionError(f"the line is not named: {error}") from error
         raise
 
 
-def damaged_past_reader(engine: str, folder: Path) -> float:
+def damaged_past_reader(engine_name: str, work_folder: Path) -> float:
     """Case: a NaN bypasses the file reader; the guard after the run must raise. Error: largest state."""
     base = vehicle()
     forces = static_forces(base, 200, 1e-3)
     forces.values[57, 0] = np.nan
-    return largest_magnitude(run(engine, setups.driven_by_forces(base, forces), 1e-3, 0.2).states)
+    return largest_magnitude(run(engine_name, setups.driven_by_forces(base, forces), 1e-3, 0.2).states)
 
 
-def uneven_steps(engine: str, folder: Path) -> float:
+def uneven_steps(engine_name: str, work_folder: Path) -> float:
     """Case: steps of 0.7 ms with samples every 1 ms must be refused. Error: largest state."""
     base = vehicle()
     forces = static_forces(base, 211, 1e-3, noise=500.0)
-    return largest_magnitude(run(engine, setups.driven_by_forces(base, forces), 0.7e-3, 0.21).states)
+    return largest_magnitude(run(engine_name, setups.driven_by_forces(base, forces), 0.7e-3, 0.21).states)
 
 
 @cache
@@ -227,17 +229,17 @@ def _road_with_bump() -> RoadUnderWheels:
     return RoadUnderWheels(run_in(SplineProfile.through(station, height, "bump")), 20.0, 2.0)
 
 
-def bump_error(engine: str, folder: Path) -> float:
+def bump_error(engine_name: str, work_folder: Path) -> float:
     """Case: an adaptive solver, after ten seconds of flat road, must not step over a bump (MuJoCo has no adaptive
     solver). Error: relative difference of the largest pitch."""
-    name = {"reference": "LSODA", "exudyn": "DOPRI5", "mujoco": "RK4"}[engine]
+    name = {"reference": "LSODA", "exudyn": "DOPRI5", "mujoco": "RK4"}[engine_name]
     assembly = vehicle().with_input("road", _road_with_bump())
-    path = run(engine, assembly, 1e-3, 10.5, name)
+    path = run(engine_name, assembly, 1e-3, 10.5, name)
     truth = run("reference", assembly, 5e-4, 10.5).states[:, 3]
     return abs(largest_magnitude(path.states[:, 3]) - largest_magnitude(truth)) / largest_magnitude(truth)
 
 
-def bump_naive(folder: Path) -> str:
+def bump_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: the bump by scipy's LSODA with default settings."""
     assembly = vehicle().with_input("road", _road_with_bump())
     model = build("reference", assembly, settings("reference", 5e-4, 10.5))
@@ -257,31 +259,33 @@ def pitch_text(states: np.ndarray) -> str:
     return f"{np.abs(states[3]).max():.0e} rad"
 
 
-def _over_waves(engine: str, step: float, error: bool = False) -> Result:
+def _over_waves(engine_name: str, time_step: float, error: bool = False) -> Result:
     """Run of the half car with stiffly damped tyres on the study road at 560 m/s for 0.2 s, in equal steps of at most
-    ``step`` (s)."""
+    ``time_step`` (s)."""
     damped = {"parameters": "itwm_drift", "override": {"d1": 3000.0, "d2": 3000.0}}
-    run = {"duration": 0.2, "step": 0.2 / math.ceil(0.2 / step - 1e-9)}
+    run = {"duration": 0.2, "step": 0.2 / math.ceil(0.2 / time_step - 1e-9)}
     road = {"road": {"source": "study", "speed": 560.0}}
-    return run_with_drift(build_scene({"title": "", "vehicle": damped, "run": run, "effects": road}), engine, error)
+    return run_with_drift(
+        build_scene({"title": "", "vehicle": damped, "run": run, "effects": road}), engine_name, error
+    )
 
 
-def passed_waves_ratio(engine: str, folder: Path) -> float:
+def passed_waves_ratio(engine_name: str, work_folder: Path) -> float:
     """Case: the study road at 560 m/s in steps of 2 ms, or 1.1 m. Error: true error divided by the stated error;
     infinite unless the stated error is a warning, and the steps that the warnings name lead to a run without a
     warning."""
-    stated_run = _over_waves(engine, 2e-3, error=True)
+    stated_run = _over_waves(engine_name, 2e-3, error=True)
     name, estimate = max(errors_of(stated_run).items(), key=lambda each: each[1].share)
     cured: Estimate | None = estimate
     for _ in range(3):
-        cured = largest_estimate(_over_waves(engine, cured.step, error=True)) if cured and cured.warned else cured
+        cured = largest_estimate(_over_waves(engine_name, cured.step, error=True)) if cured and cured.warned else cured
     if not estimate.warned or cured is None or cured.warned:
         return np.inf
-    error_of_values = stated_run[name] - _over_waves(engine, 1e-4)[name][::20]
+    error_of_values = stated_run[name] - _over_waves(engine_name, 1e-4)[name][::20]
     return float(np.sqrt(np.mean(error_of_values**2))) / estimate.error
 
 
-def passed_waves_naive(folder: Path) -> str:
+def passed_waves_naive(work_folder: Path) -> str:
     """Result without the guard, as text: error of a run whose steps miss waves of the road, against steps that resolve
     every wave."""
     ends = [_over_waves("reference", step)["z1_rate"][-1] for step in (2e-3, 1e-4)]

@@ -80,33 +80,33 @@ def static_forces(
     )
 
 
-def settings(engine: str, step: float, duration: float, integrator: str = "", **options: float) -> Settings:
+def settings(engine_name: str, time_step: float, duration: float, integrator: str = "", **options: float) -> Settings:
     """Settings of a run in an engine; the recommended integrator is the default; step and duration in s."""
-    return Settings(integrator or RECOMMENDED[engine], step, duration, **options)
+    return Settings(integrator or RECOMMENDED[engine_name], time_step, duration, **options)
 
 
 def run(
-    engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **options: float
+    engine_name: str, assembly: Assembly, time_step: float, duration: float, integrator: str = "", **options: float
 ) -> Trajectory:
     """Trajectory of a run with all checks that a user's run has, so that it may be refused."""
-    return build(engine, assembly, settings(engine, step, duration, integrator, **options)).run()
+    return build(engine_name, assembly, settings(engine_name, time_step, duration, integrator, **options)).run()
 
 
 def unchecked_run(
-    engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **options: float
+    engine_name: str, assembly: Assembly, time_step: float, duration: float, integrator: str = "", **options: float
 ) -> Trajectory:
     """Trajectory of a run without the checks before it; only the guard after the run is active."""
-    engine_settings = settings(engine, step, duration, integrator, **options)
-    return build_unchecked(engine, assembly, engine_settings).run()
+    engine_settings = settings(engine_name, time_step, duration, integrator, **options)
+    return build_unchecked(engine_name, assembly, engine_settings).run()
 
 
-def tight_solution(assembly: Assembly, step: float, duration: float) -> Trajectory:
+def tight_solution(assembly: Assembly, time_step: float, duration: float) -> Trajectory:
     """Independent trajectory by the paper's equations with order 8 at a relative tolerance of 1e-12, with rows every
-    ``step`` (s)."""
-    return run("reference", assembly, step, duration, "DOP853", tolerance=1e-12)
+    ``time_step`` (s)."""
+    return run("reference", assembly, time_step, duration, "DOP853", tolerance=1e-12)
 
 
-def exact_states(assembly: Assembly, step: float, step_count: int, forces: np.ndarray | None = None) -> np.ndarray:
+def exact_states(assembly: Assembly, time_step: float, step_count: int, forces: np.ndarray | None = None) -> np.ndarray:
     """Exact states (step_count + 1, 8) of the linearised vehicle, by the matrix exponential.
 
     forces (step_count, 2) in N are held over each step; None is the vehicle on the flat road.
@@ -118,7 +118,7 @@ def exact_states(assembly: Assembly, step: float, step_count: int, forces: np.nd
         push[:, :2] -= forces
     block = np.zeros((16, 16))
     block[:8, :8], block[:8, 8:] = first_order(linear), np.eye(8)
-    transition = expm(block * step)
+    transition = expm(block * time_step)
     states = [assembly.initial]
     for row in push:
         rate = np.concatenate((np.zeros(4), row / linear[0].diagonal()))

@@ -50,9 +50,9 @@ def vehicle_with_pitch_spring(band: float) -> Assembly:
     return replace(assembly, initial=start, vehicle=replace(assembly.vehicle, pitch_springs=(spring,)))
 
 
-def dead_band_edge_error(engine: str, folder: Path) -> float:
+def dead_band_edge_error(engine_name: str, work_folder: Path) -> float:
     """Case: the pitch crosses the edges of a spring's dead band many times. Error: largest error of the pitch (rad)."""
-    path = run(engine, vehicle_with_pitch_spring(DEAD_BAND), STEP, DURATION)
+    path = run(engine_name, vehicle_with_pitch_spring(DEAD_BAND), STEP, DURATION)
     return largest_magnitude((path.states - _kink_truth().states)[:, 3])
 
 
@@ -61,10 +61,10 @@ def _kink_truth() -> Trajectory:
     return tight_solution(vehicle_with_pitch_spring(DEAD_BAND), STEP, DURATION)
 
 
-def kink_naive(folder: Path) -> str:
+def kink_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: error of Exudyn's limit stops in place of the force law."""
     with mock.patch.object(exudyn_engine, "_add_pitch_spring", _limit_stop):
-        pitch_error = dead_band_edge_error("exudyn", folder)
+        pitch_error = dead_band_edge_error("exudyn", work_folder)
     return f"Exudyn's limit stops, asked once per step: pitch off by {pitch_error:.1e} rad"
 
 
@@ -83,11 +83,11 @@ def _limit_stop(build: exudyn_engine.PitchPlaneBuild, spring: PitchSpring) -> No
     )
 
 
-def wide_dead_band_error(engine: str, folder: Path) -> float:
+def wide_dead_band_error(engine_name: str, work_folder: Path) -> float:
     """Case: a dead band wider than the motion. Error: difference of the states from a run without the spring."""
     tied = vehicle_with_pitch_spring(1.0)
     free = replace(tied, vehicle=replace(tied.vehicle, pitch_springs=()))
-    between, free_states = (run(engine, assembly, STEP, DURATION).states for assembly in (tied, free))
+    between, free_states = (run(engine_name, assembly, STEP, DURATION).states for assembly in (tied, free))
     return largest_magnitude(between - free_states)
 
 
@@ -100,9 +100,9 @@ def vehicle_under_held_forces(moment_held: bool = False) -> Assembly:
     return replace(assembly, moment=Sampled(samples, 4e-3, moment_held))
 
 
-def moving_moment_error(engine: str, folder: Path) -> float:
+def moving_moment_error(engine_name: str, work_folder: Path) -> float:
     """Case: forces constant over each sample and an interpolated moment. Error: largest error of the pitch (rad)."""
-    path = run(engine, vehicle_under_held_forces(), STEP, DURATION)
+    path = run(engine_name, vehicle_under_held_forces(), STEP, DURATION)
     return largest_magnitude((path.states - _moving_truth().states)[:, 3])
 
 
@@ -111,16 +111,16 @@ def _moving_truth() -> Trajectory:
     return tight_solution(vehicle_under_held_forces(), STEP, DURATION)
 
 
-def moving_moment_naive(folder: Path) -> str:
+def moving_moment_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: error if the moment is held over a sample like the forces."""
     path = unchecked_run("reference", vehicle_under_held_forces(moment_held=True), STEP, DURATION)
     return f"held as well: pitch off by {largest_magnitude((path.states - _moving_truth().states)[:, 3]):.1e} rad"
 
 
-def moment_off_the_grid(engine: str, folder: Path) -> float:
+def moment_off_the_grid(engine_name: str, work_folder: Path) -> float:
     """Case: a moment sampled every 1.5 ms in a run with steps of 1 ms must be refused. Error: 0 if it is not."""
     moment = Sampled(np.zeros((400, 1)), 1.5e-3, held=False)
-    run(engine, replace(vehicle_under_held_forces(), moment=moment), STEP, DURATION)
+    run(engine_name, replace(vehicle_under_held_forces(), moment=moment), STEP, DURATION)
     return 0.0
 
 
@@ -146,21 +146,21 @@ def guided_assembly(noise: float = 0.0, mass: float = 1.0) -> Assembly:
     return assembly.without_tyres().with_input("heave-pitch", signal)
 
 
-def _guided_run(engine: str, assembly: Assembly) -> Trajectory:
-    return run(engine, assembly, 2.5e-4, DURATION, CONSTRAINED_INTEGRATORS[engine])
+def _guided_run(engine_name: str, assembly: Assembly) -> Trajectory:
+    return run(engine_name, assembly, 2.5e-4, DURATION, CONSTRAINED_INTEGRATORS[engine_name])
 
 
-def missing_mass_error(engine: str, folder: Path) -> float:
+def missing_mass_error(engine_name: str, work_folder: Path) -> float:
     """Case: a model whose chassis is 5 % too light. Error: relative difference of the mean stabilising force from 0.05
     m3 (g - z3'')."""
     p, states = vehicle("asymmetric_twin").parameters, _free_motion()
-    force = _guided_run(engine, guided_assembly(mass=0.95)).force
+    force = _guided_run(engine_name, guided_assembly(mass=0.95)).force
     assert force is not None
     wanted = 0.05 * p.m3 * (p.g - (states[-1, 6] - states[0, 6]) / DURATION)
     return abs(float(force.mean()) / wanted - 1)
 
 
-def missing_mass_naive(folder: Path) -> str:
+def missing_mass_naive(work_folder: Path) -> str:
     """Difference between the states of guided runs with the true and a wrong mass, as text."""
     states_of_true, states_of_wrong = (
         _guided_run("reference", guided_assembly(mass=mass)).states for mass in (1.0, 0.95)
@@ -171,12 +171,12 @@ def missing_mass_naive(folder: Path) -> str:
     )
 
 
-def guided_noise_gain(engine: str, folder: Path) -> float:
+def guided_noise_gain(engine_name: str, work_folder: Path) -> float:
     """Case: noise of 1e-6 m and rad on prescribed heave and pitch. Error: rms change of enforced force and moment,
     divided by the finite-difference values."""
     p = vehicle("asymmetric_twin").parameters
     enforced, clean = (
-        _guided_run(engine, guided_assembly(NOISE)).enforced,
+        _guided_run(engine_name, guided_assembly(NOISE)).enforced,
         _guided_run("reference", guided_assembly()).enforced,
     )
     assert enforced is not None and clean is not None
@@ -184,53 +184,53 @@ def guided_noise_gain(engine: str, folder: Path) -> float:
     return float((np.sqrt(np.mean((enforced - clean) ** 2, axis=0)) / sizes).max())
 
 
-def measured_pitch(folder: Path, **values: float) -> Assembly:
+def measured_pitch(work_folder: Path, **values: float) -> Assembly:
     """Writes the files of a scene whose prescribed pitch has the noise of an inertial unit, 0.1 degrees at 1 kHz, and
     returns its assembly."""
     t = STEP * np.arange(1001)
     noise = np.deg2rad(0.1) * np.random.default_rng(8).standard_normal(len(t))
-    write_time_series(folder / "pitch.csv", {"pitch": ("rad", 0.05 * np.sin(6.0 * t) + noise)}, STEP)
-    write_time_series(folder / "forces.csv", {"front": ("N", 3.8e3 + 0 * t), "rear": ("N", 3.8e3 + 0 * t)}, STEP)
+    write_time_series(work_folder / "pitch.csv", {"pitch": ("rad", 0.05 * np.sin(6.0 * t) + noise)}, STEP)
+    write_time_series(work_folder / "forces.csv", {"front": ("N", 3.8e3 + 0 * t), "rear": ("N", 3.8e3 + 0 * t)}, STEP)
     effects = {
         "wheel_forces": {"file": "forces.csv", "interpolation": "linear"},
         "prescribed_pitch": {"file": "pitch.csv", **values},
     }
     return assembly_of_scene(
-        build_scene({"title": "hard case", "run": {"duration": 1.0}, "effects": effects}, "", folder)
+        build_scene({"title": "hard case", "run": {"duration": 1.0}, "effects": effects}, "", work_folder)
     )
 
 
-def smoothed_pitch_error(engine: str, folder: Path) -> float:
+def smoothed_pitch_error(engine_name: str, work_folder: Path) -> float:
     """Case: a pitch smoothed to 5 Hz is prescribed. Error: difference of the enforced moment from the solution in which
     the pitch is eliminated, divided by its rms."""
-    assembly = measured_pitch(folder, bandwidth=5.0)
-    moment = run(engine, assembly, STEP, 1.0, CONSTRAINED_INTEGRATORS[engine]).moment
+    assembly = measured_pitch(work_folder, bandwidth=5.0)
+    moment = run(engine_name, assembly, STEP, 1.0, CONSTRAINED_INTEGRATORS[engine_name]).moment
     true = run("reference", assembly, STEP / 8, 1.0).moment
     assert moment is not None and true is not None
     return root_mean_square((moment - true[::8])[50:]) / root_mean_square(true)
 
 
-def smoothed_naive(folder: Path) -> str:
+def smoothed_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: the noisy pitch is used without smoothing."""
-    raw = run("reference", measured_pitch(folder), STEP, 1.0).moment
+    raw = run("reference", measured_pitch(work_folder), STEP, 1.0).moment
     assert raw is not None
     return f"without a bandwidth the moment is {root_mean_square(raw):.1e} N m rms, and Exudyn's multiplier raises"
 
 
-def beyond_nyquist(engine: str, folder: Path) -> float:
+def beyond_nyquist(engine_name: str, work_folder: Path) -> float:
     """Case: a smoothing bandwidth above half of the file's sampling rate must be refused."""
-    run(engine, measured_pitch(folder, bandwidth=600.0), STEP, 1.0, CONSTRAINED_INTEGRATORS[engine])
+    run(engine_name, measured_pitch(work_folder, bandwidth=600.0), STEP, 1.0, CONSTRAINED_INTEGRATORS[engine_name])
     return 0.0
 
 
 def _refused_scene(effects: dict[str, Any]) -> Callable[[str, Path], float]:
     """Case: a scene under wheel forces with the effects must be refused."""
 
-    def error(engine: str, folder: Path) -> float:
-        measured_pitch(folder)  # writes the files
+    def error(engine_name: str, work_folder: Path) -> float:
+        measured_pitch(work_folder)  # writes the files
         forces = {"wheel_forces": {"file": "forces.csv", "interpolation": "linear"}}
         table = {"title": "hard case", "run": {"duration": 1.0}, "effects": forces | effects}
-        run(engine, assembly_of_scene(build_scene(table, "", folder)), STEP, 1.0)
+        run(engine_name, assembly_of_scene(build_scene(table, "", work_folder)), STEP, 1.0)
         return 0.0
 
     return error

@@ -42,30 +42,30 @@ def _displaced_vehicle(geometry: str = "linear"):
     return replace(base, initial=base.initial + np.array([1e-3, 0, 0, 0, 0, 0, 0, 0]))
 
 
-def inside_limit_error(engine: str, folder: Path) -> float:
+def inside_limit_error(engine_name: str, work_folder: Path) -> float:
     """Case: RK4 with 300 steps of 3.9 ms, just inside the stability limit; the fastest mode must have decayed. Error:
     difference of the final state from the exact one divided by the displacement."""
     assembly = _displaced_vehicle()
-    path = run(engine, assembly, 3.9e-3, 1.17)
+    path = run(engine_name, assembly, 3.9e-3, 1.17)
     return largest_magnitude(path.states[-1] - exact_states(assembly, 3.9e-3, 300)[-1]) / 1e-3
 
 
-def beyond_limit_error(engine: str, folder: Path) -> float:
+def beyond_limit_error(engine_name: str, work_folder: Path) -> float:
     """Case: RK4 with eight steps of 5 ms, beyond the stability limit, so that all values are still small and finite; it
     must be refused. Error: relative difference from the tight-tolerance solution."""
     assembly = vehicle(effects=ROAD)
-    path = run(engine, assembly, 5e-3, 0.04)
+    path = run(engine_name, assembly, 5e-3, 0.04)
     return _against_tight(assembly, path.states, 5e-3)
 
 
-def _against_tight(assembly, states, step: float) -> float:
+def _against_tight(assembly, states, time_step: float) -> float:
     """Largest difference of the states from the tight-tolerance solution, divided by the solution's largest
     displacement."""
-    truth = tight_solution(assembly, step, (len(states) - 1) * step).states
+    truth = tight_solution(assembly, time_step, (len(states) - 1) * time_step).states
     return largest_magnitude(states - truth) / largest_magnitude(truth - truth[0])
 
 
-def beyond_limit_naive(folder: Path) -> str:
+def beyond_limit_naive(work_folder: Path) -> str:
     """Result without the guard, as text: the run beyond the stability limit."""
     assembly = vehicle(effects=ROAD)
     shares = [
@@ -74,14 +74,14 @@ def beyond_limit_naive(folder: Path) -> str:
     return f"unchecked, all three answer, finite, off by {min(shares):.0%} to {max(shares):.0%} of the motion"
 
 
-def reset_error(engine: str, folder: Path) -> float:
+def reset_error(engine_name: str, work_folder: Path) -> float:
     """Case: RK4 at 8 ms without the checks before the run, so that only the guard after the run remains. Error:
     relative difference from the tight-tolerance solution."""
     assembly = vehicle(effects=ROAD)
-    return _against_tight(assembly, unchecked_run(engine, assembly, 8e-3, 2.0).states, 8e-3)
+    return _against_tight(assembly, unchecked_run(engine_name, assembly, 8e-3, 2.0).states, 8e-3)
 
 
-def reset_naive(folder: Path) -> str:
+def reset_naive(work_folder: Path) -> str:
     """Result without the guard, as text: MuJoCo resets the state, and its time starts again."""
     model = mujoco_engine.MujocoModel(_displaced_vehicle("exact"), settings("mujoco", 8e-3, 2.0)).model
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
@@ -95,14 +95,14 @@ def reset_naive(folder: Path) -> str:
     return f"MuJoCo resets itself {resets} times, ends at t = {data.time:.3f} s of 2 s, all finite, no exception"
 
 
-def huge_states_error(engine: str, folder: Path) -> float:
+def huge_states_error(engine_name: str, work_folder: Path) -> float:
     """Case: a first-order explicit method at 5 ms without the checks before the run. Error: relative difference from
     the tight-tolerance solution."""
     assembly = vehicle(effects=ROAD)
-    return _against_tight(assembly, unchecked_run(engine, assembly, 5e-3, 2.0, EULER[engine]).states, 5e-3)
+    return _against_tight(assembly, unchecked_run(engine_name, assembly, 5e-3, 2.0, EULER[engine_name]).states, 5e-3)
 
 
-def huge_naive(folder: Path) -> str:
+def huge_naive(work_folder: Path) -> str:
     """Result without the guard, as text: Exudyn's own success flag, and the largest finite state."""
     assembly = vehicle(geometry="linear", initial=_displaced_vehicle().initial)
     model = exudyn_engine.build(assembly, settings("exudyn", 5e-3, 2.0, "ExplicitEuler"))
@@ -111,11 +111,11 @@ def huge_naive(folder: Path) -> str:
     return f"Exudyn returns {flag} with states of up to {largest_magnitude(states[np.isfinite(states)]):.0e}"
 
 
-def sudden_load_error(engine: str, folder: Path) -> float:
+def sudden_load_error(engine_name: str, work_folder: Path) -> float:
     """Case: the front force rises by 1 kN from one sample to the next, in steps of 1 ms. Error: difference of the
     states from the exact ones divided by the largest wheel velocity."""
     assembly, forces = _step_force()
-    path = run(engine, assembly, 1e-3, 0.2)
+    path = run(engine_name, assembly, 1e-3, 0.2)
     truth = exact_states(assembly, 1e-3, 200, forces.sample(0.0, 1e-3, 200))
     return largest_magnitude(path.states - truth) / largest_magnitude(truth[:, 4])
 
@@ -128,7 +128,7 @@ def _step_force():
     return driven_by_forces(base, forces), forces
 
 
-def sudden_naive(folder: Path) -> str:
+def sudden_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: generalised-alpha with a step that does not resolve the fast pole."""
     assembly, forces = _step_force()
     path = unchecked_run("exudyn", assembly, 10e-3, 0.2, "GeneralizedAlpha", spectral_radius=0.9)
@@ -140,44 +140,44 @@ def sudden_naive(folder: Path) -> str:
     )
 
 
-def repeated_run_difference(engine: str, folder: Path) -> float:
+def repeated_run_difference(engine_name: str, work_folder: Path) -> float:
     """Case: a model is run twice, with an acceleration evaluated in between. Error: difference of the runs, which must
     be 0."""
     base = vehicle()
     forces = static_forces(base, 200, 1e-3, noise=500.0)
     worst = 0.0
-    for integrator in ("", "DOP853" if engine == "reference" else IMPLICIT_INTEGRATORS[engine]):
+    for integrator in ("", "DOP853" if engine_name == "reference" else IMPLICIT_INTEGRATORS[engine_name]):
         signal = replace(forces, held=False) if integrator == "GeneralizedAlpha" else forces
-        model = build(engine, driven_by_forces(base, signal), settings(engine, 1e-3, 0.2, integrator))
+        model = build(engine_name, driven_by_forces(base, signal), settings(engine_name, 1e-3, 0.2, integrator))
         first = model.run().states
         model.acceleration(0.05, *np.split(first[50], 2))
         worst = max(worst, largest_magnitude(model.run().states - first))
     return worst
 
 
-def restart_difference(engine: str, folder: Path) -> float:
+def restart_difference(engine_name: str, work_folder: Path) -> float:
     """Case: a run is stopped at half its time and continued from the saved state. Error: difference of the states from
     the uninterrupted run."""
     base = vehicle()
     forces = static_forces(base, 400, 1e-3, noise=500.0)
-    full_states = run(engine, driven_by_forces(base, forces), 1e-3, 0.4).states
+    full_states = run(engine_name, driven_by_forces(base, forces), 1e-3, 0.4).states
     second_half = driven_by_forces(
         replace(base, initial=full_states[200].copy()), Sampled(forces.values[200:], 1e-3, True)
     )
-    return largest_magnitude(run(engine, second_half, 1e-3, 0.2).states - full_states[200:])
+    return largest_magnitude(run(engine_name, second_half, 1e-3, 0.2).states - full_states[200:])
 
 
-def adaptive_time_error(engine: str, folder: Path) -> float:
+def adaptive_time_error(engine_name: str, work_folder: Path) -> float:
     """Case: an adaptive run, whose rows lie at other times than asked for. Error: difference of each row from the exact
     state at its time."""
-    name = {"reference": "DOP853"}.get(engine, "DOPRI5")
-    build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
+    name = {"reference": "DOP853"}.get(engine_name, "DOPRI5")
+    build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine_name: {"integrator": name}}})
     assembly = _displaced_vehicle()
-    path = run(engine, assembly, 1e-3, 0.2, name)
+    path = run(engine_name, assembly, 1e-3, 0.2, name)
     return largest_magnitude(path.states - exact_decay(assembly, path.times))
 
 
-def stamps_naive(folder: Path) -> str:
+def stamps_naive(work_folder: Path) -> str:
     """Result without the remedy, as text: error if row numbers are used as times."""
     assembly = _displaced_vehicle()
     path = run("exudyn", assembly, 1e-3, 0.2, "DOPRI5")
@@ -192,16 +192,16 @@ def stamps_naive(folder: Path) -> str:
 ORDERS = {"reference": 4.0, "exudyn": 2.0, "mujoco": 4.0}
 
 
-def lost_order(engine: str, folder: Path) -> float:
+def lost_order(engine_name: str, work_folder: Path) -> float:
     """Case: four halvings of a step of 2 ms. Error: amount by which the observed order of convergence is below the
     declared one."""
     base = vehicle("asymmetric_twin", "linear")
     base = replace(base, initial=base.initial - np.array([0, 0, 0.01, 0.02, 0, 0, 0, 0]))
     truth, errors = exact_states(base, 0.1, 2)[-1], []
     for step in (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4):
-        end = run(engine, base, step, 0.2, CONSTRAINED_INTEGRATORS[engine]).states[-1]
+        end = run(engine_name, base, step, 0.2, CONSTRAINED_INTEGRATORS[engine_name]).states[-1]
         errors.append(largest_magnitude(end - truth))
-    return float(ORDERS[engine] - np.log2(np.array(errors[:-1]) / errors[1:]).min())
+    return float(ORDERS[engine_name] - np.log2(np.array(errors[:-1]) / errors[1:]).min())
 
 
 CASES = (
