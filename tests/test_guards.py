@@ -201,7 +201,7 @@ def test_an_interrupt_in_exudyn_is_an_interrupt(monkeypatch):
 
 def test_held_forces_beside_a_prescribed_pitch_do_not_hold_the_pitch():
     base = setups.vehicle()
-    forces = setups.static_forces(base, 300, 1e-3, noise=500.0)
+    forces = setups.static_forces(base, 300, 1e-3, noise_deviation=500.0)
     pitch = setups.smooth_pitch(0.02 * np.sin(6.0 * 1e-3 * np.arange(301)), 1e-3)
     assembly = setups.guided_vehicle(base, forces, pitch)
     fine = setups.run("reference", assembly, 1.25e-4, 0.2).states[::8]

@@ -24,8 +24,8 @@ ANY_SYSTEM = "any"
 
 @cache
 def study_names() -> tuple[str, ...]:
-    """Names of all studies: files of the studies' folder that define ``run(scene, engines, output_folder, report_progress)``; they
-    are read, not imported."""
+    """Names of all studies: files of the studies' folder that define ``run(scene, engines, output_folder,
+    report_progress)``; they are read, not imported."""
     files = sorted(STUDIES_FOLDER.glob("*.py"))
     return tuple(file.stem for file in files if re.search(r"^def run\(\s*scene", file.read_text(), re.MULTILINE))
 

@@ -210,7 +210,7 @@ def _input_rows(engine: str) -> list[Row]:
     numbers = nan_force_endings(engine)
     caught = {name: "caught" if ended in ("raised", "refused") else ended for name, ended in numbers.items()}
     with TemporaryDirectory() as files_folder:
-        file = ending(lambda: sampled_input.damaged_file(engine, Path(files_folder)))
+        file = ending(lambda: sampled_input.state_from_damaged_file(engine, Path(files_folder)))
     return [
         behaviour_row(
             f"guards.nan-file.{engine}",
@@ -232,7 +232,7 @@ def _input_rows(engine: str) -> list[Row]:
             f"guards.step-sampling.{engine}",
             SYSTEM,
             f"a step that does not divide the sampling period, {engine}",
-            ending(lambda: sampled_input.uneven_steps(engine, Path())),
+            ending(lambda: sampled_input.state_with_uneven_steps(engine, Path())),
             "refused",
             "a held sample would change in a step",
         ),

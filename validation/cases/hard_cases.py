@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table, behaviour_row
 from validation.hard_cases import cases_by_family
-from validation.hard_cases.case import IMPLEMENTATIONS, WORDS, Case, CaseOutcome, judge
+from validation.hard_cases.case import IMPLEMENTATIONS, WORDS, CaseOutcome, HardCase, judge
 from validation.hard_cases.catalogue import COVERED_CLASSES, cases_beyond_catalogue
 
 TITLE = "Hard cases"
@@ -30,8 +30,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     known, rows, data = cases_by_family(), list[Row](), list[Saved]()
     for family, case in quick_cases(known) if quick else known:
         with TemporaryDirectory() as files_folder:
-            outcomes = {name: judge(case, name, Path(files_folder)) for name in case.judged()}
-            naive = case.naive(Path(files_folder)) if case.naive else ""
+            outcomes = {name: judge(case, name, Path(files_folder)) for name in case.judged_engines()}
+            naive = case.naive_result(Path(files_folder)) if case.naive_result else ""
         rows += [_outcome_row(case, name, outcome) for name, outcome in outcomes.items()]
         case_texts: Saved = {"name": case.name, "hard": case.difficulty, "check": case.exact_answer}
         case_texts |= {"unit": case.unit, "tolerance": case.tolerance}
@@ -66,20 +66,20 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {"cases": data, "known": [(family, case.name) for family, case in known]}
 
 
-def quick_cases(cases: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
+def quick_cases(cases: Sequence[tuple[str, HardCase]]) -> list[tuple[str, HardCase]]:
     """Cases of a quick run: the last case of each family, and every QUICK_SPACING-th before it."""
     families = dict.fromkeys(family for family, _ in cases)
     return [pair for name in families for pair in [case for case in cases if case[0] == name][::-QUICK_SPACING]]
 
 
-def _outcome_row(case: Case, implementation: str, outcome: CaseOutcome) -> Row:
+def _outcome_row(case: HardCase, implementation: str, outcome: CaseOutcome) -> Row:
     """Row of a hard case: its error if a result is expected and given, else its outcome."""
-    id = f"hard.{case.name.replace(',', '').replace(' ', '-')}.{'any' if case.without_engine else implementation}"
-    quantity = f"{case.name}{'' if case.without_engine else f', {implementation}'}: {case.exact_answer}"
-    if case.wanted(implementation) == "right" and outcome.error is not None:
+    id = f"hard.{case.name.replace(',', '').replace(' ', '-')}.{'any' if case.is_without_engine else implementation}"
+    quantity = f"{case.name}{'' if case.is_without_engine else f', {implementation}'}: {case.exact_answer}"
+    if case.wanted_outcome(implementation) == "right" and outcome.error is not None:
         error, judged = outcome.error, case.independence(implementation)
         return Observed(id, SYSTEM, quantity, error, case.unit).at_most(case.tolerance, case.tolerance_reason, judged)
-    return behaviour_row(id, SYSTEM, quantity, outcome.word, case.wanted(implementation), case.difficulty)
+    return behaviour_row(id, SYSTEM, quantity, outcome.word, case.wanted_outcome(implementation), case.difficulty)
 
 
 def tables(case_data: Saved) -> list[Table]:

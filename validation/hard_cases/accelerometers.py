@@ -19,7 +19,7 @@ from models.sensors.rotations import quaternion_from_cardan, rotation_matrix
 from models.sensors.sensor_array import sensor_array
 from models.systems.pitch_plane.effects.accelerometers import readings_of
 from models.systems.pitch_plane.run import run as simulate
-from validation.hard_cases.case import Case
+from validation.hard_cases.case import HardCase
 from validation.hard_cases.setups import (
     REFUSED,
     driven_by_forces,
@@ -45,9 +45,9 @@ BRACKET_SENSORS = {"battery": {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"freque
 def _readings_of_run(
     engine_name: str,
     sensor_positions: dict[str, Any],
-    extra: dict[str, Any] | None = None,
+    extra_effects: dict[str, Any] | None = None,
     noise: float = 0.0,
-    initial: np.ndarray | None = None,
+    start_state: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Accelerometer readings (n, sensors, 3) in m/s^2, states (n, 8) and pitch accelerations (n,) in rad/s^2 of a run
     of 0.3 s.
@@ -55,15 +55,15 @@ def _readings_of_run(
     After a kick on a flat road, or in free fall from an initial state.
     """
     sensors = {name: dict(zip("xyz", position, strict=True)) for name, position in sensor_positions.items()} | (
-        extra or {}
+        extra_effects or {}
     )
     start = vehicle().initial + np.array([0, 0, 0, 0, 0, 0, 0.5, 1.5])
     base = vehicle(
-        initial=start if initial is None else initial,
+        start_state=start if start_state is None else start_state,
         effects={"accelerometers": {"sampling_rate": 1 / SAMPLE_PERIOD, "sensors": sensors, "deviation": noise}},
     )
     assembly = (
-        base if initial is None else driven_by_forces(base, Sampled(np.zeros((400, 2)), SAMPLE_PERIOD, held=True))
+        base if start_state is None else driven_by_forces(base, Sampled(np.zeros((400, 2)), SAMPLE_PERIOD, held=True))
     )
     engine_settings = settings(engine_name, SAMPLE_PERIOD, 0.3)
     model = build(engine_name, assembly, engine_settings)
@@ -97,7 +97,7 @@ def flat_floor_error(engine_name: str, work_folder: Path) -> float:
     return largest_magnitude(computed - true) / largest_magnitude(true)
 
 
-def flat_floor_naive(work_folder: Path) -> str:
+def flat_floor_naive_result(work_folder: Path) -> str:
     """Result of the printed formula on the readings of sensors on a flat floor, as text."""
     felt, _, true = _readings_of_run("reference", FLOOR_SENSORS)
     ratio = root_mean_square(_pitch_acceleration(FLOOR_SENSORS, felt)) / root_mean_square(true)
@@ -114,7 +114,7 @@ def nearly_flat_floor_error(engine_name: str, work_folder: Path) -> float:
     return root_mean_square(computed - true) / (NOISE * least_gain)
 
 
-def nearly_flat_floor_naive(work_folder: Path) -> str:
+def nearly_flat_floor_naive_result(work_folder: Path) -> str:
     """Result of the printed formula on the readings of sensors nearly in a plane, as text."""
     felt, _, true = _readings_of_run("reference", LIFTED_SENSORS, noise=NOISE)
     error = root_mean_square(_pitch_acceleration(LIFTED_SENSORS, felt) - true)
@@ -133,7 +133,7 @@ def loose_bracket_error(engine_name: str, work_folder: Path) -> float:
     return largest_magnitude(computed - true) / largest_magnitude(true)
 
 
-def loose_bracket_naive(work_folder: Path) -> str:
+def loose_bracket_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: the printed formula with all six sensors."""
     felt, _, true = _readings_of_run("reference", ROOF_SENSORS, BRACKET_SENSORS)
     wrong = largest_magnitude(
@@ -151,7 +151,7 @@ def missing_reading_error(engine_name: str, work_folder: Path) -> float:
     )
 
 
-def missing_reading_naive(work_folder: Path) -> str:
+def missing_reading_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: share of the record for which a sum over the printed formula's values is lost
     by one NaN."""
     felt, _, _ = _readings_of_run("reference", ROOF_SENSORS)
@@ -160,12 +160,12 @@ def missing_reading_naive(work_folder: Path) -> str:
     return f"a sum over one missing reading is lost for {100 * lost:.0f} % of the record"
 
 
-def _free_fall(engine_name: str, pitch: float, rate: float) -> tuple[np.ndarray, np.ndarray, StartState]:
+def _free_fall(engine_name: str, pitch: float, pitch_rate: float) -> tuple[np.ndarray, np.ndarray, StartState]:
     """Accelerometer readings, states and initial state of a rotating vehicle in free fall with unstressed struts."""
-    p, sine, speed = vehicle().parameters, np.sin(pitch), np.cos(pitch) * rate
-    start = np.array([-p.b * sine, p.a * sine, 0, pitch, -p.b * speed, p.a * speed, 0, rate])
-    felt, states, _ = _readings_of_run(engine_name, ROOF_SENSORS, initial=start)
-    return felt, states, StartState.pitched(pitch, rate)
+    p, sine, speed = vehicle().parameters, np.sin(pitch), np.cos(pitch) * pitch_rate
+    start = np.array([-p.b * sine, p.a * sine, 0, pitch, -p.b * speed, p.a * speed, 0, pitch_rate])
+    felt, states, _ = _readings_of_run(engine_name, ROOF_SENSORS, start_state=start)
+    return felt, states, StartState.pitched(pitch, pitch_rate)
 
 
 def vertical_nose_error(engine_name: str, work_folder: Path) -> float:
@@ -187,7 +187,7 @@ def gimbal_lock_error(engine_name: str, work_folder: Path) -> float:
     )
 
 
-def gimbal_lock_naive(work_folder: Path) -> str:
+def gimbal_lock_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: roll angle by the textbook's formula at gimbal lock."""
     s = rotation_matrix(quaternion_from_cardan(0.3, np.pi / 2, 0.0))
     roll = np.arctan2(s[2, 1], s[2, 2])
@@ -195,7 +195,7 @@ def gimbal_lock_naive(work_folder: Path) -> str:
 
 
 CASES = (
-    Case(
+    HardCase(
         "accelerometers in a plane",
         "sensors on a flat floor do not see half of the pitch acceleration",
         "the engine's own pitch acceleration",
@@ -204,9 +204,9 @@ CASES = (
         "the formula for a plane is exact: rounding only",
         flat_floor_error,
         {},
-        flat_floor_naive,
+        flat_floor_naive_result,
     ),
-    Case(
+    HardCase(
         "accelerometers nearly in a plane",
         "one sensor 3 cm off the plane makes the formula solvable and its noise 22 times larger",
         "noise of the pitch acceleration against that of the formula for a plane",
@@ -215,9 +215,9 @@ CASES = (
         "300 samples: 4 % standard error",
         nearly_flat_floor_error,
         {},
-        nearly_flat_floor_naive,
+        nearly_flat_floor_naive_result,
     ),
-    Case(
+    HardCase(
         "accelerometer on a bracket",
         "one of six sensors moves on its own",
         "the engine's own pitch acceleration, once the loose sensor is found and left out",
@@ -226,9 +226,9 @@ CASES = (
         "five rigid sensors: rounding only",
         loose_bracket_error,
         {},
-        loose_bracket_naive,
+        loose_bracket_naive_result,
     ),
-    Case(
+    HardCase(
         "accelerometer reading that is no number",
         "one missing reading spreads over the whole record by integration",
         "refused with sensor and sample",
@@ -237,9 +237,9 @@ CASES = (
         "no answer is wanted",
         missing_reading_error,
         REFUSED,
-        missing_reading_naive,
+        missing_reading_naive_result,
     ),
-    Case(
+    HardCase(
         "attitude through the vertical",
         "Cardan angles are singular where the nose points straight up",
         "orientation of a tumbling vehicle",
@@ -248,7 +248,7 @@ CASES = (
         "quaternions pass; order 4 at 1 ms, across wheel modes of 700 1/s",
         vertical_nose_error,
     ),
-    Case(
+    HardCase(
         "Cardan angles at gimbal lock",
         "roll and yaw turn about the same axis",
         "refused with the sample and its pitch",
@@ -257,6 +257,6 @@ CASES = (
         "no answer is wanted",
         gimbal_lock_error,
         REFUSED,
-        gimbal_lock_naive,
+        gimbal_lock_naive_result,
     ),
 )

@@ -14,7 +14,7 @@ IMPLEMENTATIONS = ("reference", "exudyn", "mujoco")
 
 
 @dataclass(frozen=True)
-class Case:
+class HardCase:
     """A hard case, judged in each implementation.
 
     Attributes
@@ -34,19 +34,19 @@ class Case:
     unit: str
     tolerance: float
     tolerance_reason: str
-    error: Callable[[str, Path], float]
-    expected: Mapping[str, OutcomeWord] = field(default_factory=dict)
-    naive: Callable[[Path], str] | None = None
+    error_function: Callable[[str, Path], float]
+    expected_outcomes: Mapping[str, OutcomeWord] = field(default_factory=dict)
+    naive_result: Callable[[Path], str] | None = None
     answer_independence: Independence = "closed form"
-    without_engine: bool = False
+    is_without_engine: bool = False
 
-    def wanted(self, engine_name: str) -> OutcomeWord:
+    def wanted_outcome(self, engine_name: str) -> OutcomeWord:
         """The outcome that an implementation must have in this case."""
-        return self.expected.get(engine_name, "right")
+        return self.expected_outcomes.get(engine_name, "right")
 
-    def judged(self) -> tuple[str, ...]:
+    def judged_engines(self) -> tuple[str, ...]:
         """Names of the implementations in which this case is judged."""
-        return IMPLEMENTATIONS[:1] if self.without_engine else IMPLEMENTATIONS
+        return IMPLEMENTATIONS[:1] if self.is_without_engine else IMPLEMENTATIONS
 
     def independence(self, engine_name: str) -> Independence:
         """How independent the exact answer is of an implementation. The tight-tolerance solution uses the reference's
@@ -68,11 +68,11 @@ class CaseOutcome:
     message: str = ""
 
 
-def judge(case: Case, engine_name: str, work_folder: Path) -> CaseOutcome:
+def judge(case: HardCase, engine_name: str, work_folder: Path) -> CaseOutcome:
     """Outcome of a case in an implementation. Only InputError and RunFailed count as outcomes; other exceptions pass
     through."""
     try:
-        error = float(case.error(engine_name, work_folder))
+        error = float(case.error_function(engine_name, work_folder))
     except InputError as refusal:
         return CaseOutcome("refused", message=str(refusal))
     except RunFailed as failure:

@@ -13,19 +13,19 @@ from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.fastsim_derivatives import derivatives
 from models.contact.linear_theory import forces
 from models.contact.material import MaterialPair
-from validation.hard_cases.case import Case
+from validation.hard_cases.case import HardCase
 
 MATERIAL_PAIR = MaterialPair()
 A, B, LOAD, MU = 6e-3, 4e-3, 80e3, 0.3
 
 
-def force_without_creepage(engine_name: str, work_folder: Path) -> float:
+def largest_force_without_creepage(engine_name: str, work_folder: Path) -> float:
     """Case: no creepage. Error: largest creep force (N); infinite if a derivative is not finite."""
     answer = derivatives(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 0.0), MATERIAL_PAIR)
     return float(np.abs(answer.forces).max() + (0.0 if np.isfinite(answer.slopes).all() else np.inf))
 
 
-def no_creepage_naive(work_folder: Path) -> str:
+def no_creepage_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: the weighted flexibility of 1982 without creepage is 0/0."""
     with np.errstate(invalid="ignore"):
         weighted = np.float64(0.0) / np.float64(0.0)
@@ -53,7 +53,7 @@ def opposed_spin_error(engine_name: str, work_folder: Path) -> float:
     return float(np.hypot(coarse.fx - fine.fx, coarse.fy - fine.fy).max() / (MU * LOAD))
 
 
-def opposed_spin_naive(work_folder: Path) -> str:
+def opposed_spin_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: the march of 1982 on the same cells."""
     motion = (0.0, -0.25 * A, 0.5)
     plain, fine = (
@@ -89,17 +89,17 @@ def locked_wheel_excess(engine_name: str, work_folder: Path) -> float:
 
 
 CASES = (
-    Case(
+    HardCase(
         "rolling without creepage",
         "the mean flexibility is 0/0",
         "no force, derivatives are numbers",
         "N",
         0.0,
         "exact",
-        force_without_creepage,
-        naive=no_creepage_naive,
+        largest_force_without_creepage,
+        naive_result=no_creepage_naive_result,
     ),
-    Case(
+    HardCase(
         "creepage of 1e-300",
         "squares underflow",
         "linear theory",
@@ -108,7 +108,7 @@ CASES = (
         "error of 21 cells",
         tiny_creepage_error,
     ),
-    Case(
+    HardCase(
         "spin against lateral creepage",
         "forces nearly cancel, tractions turn about a pole",
         "201 cells per strip",
@@ -117,12 +117,12 @@ CASES = (
         "error of 21 cells",
         opposed_spin_error,
         answer_independence="none",
-        naive=opposed_spin_naive,
+        naive_result=opposed_spin_naive_result,
     ),
-    Case(
+    HardCase(
         "lift-off", "axes and stiffness vanish", "mu N to 1e-12 N, then none", "mu N", 1e-12, "rounding", lift_off_error
     ),
-    Case(
+    HardCase(
         "cells that begin to slip",
         "a cell sticks or slips, nothing between",
         "second difference of a creep curve",
@@ -132,7 +132,7 @@ CASES = (
         creep_curve_roughness,
         answer_independence="none",
     ),
-    Case(
+    HardCase(
         "locked wheel with spin",
         "no cell sticks, directions all differ",
         "|F| <= mu N",

@@ -11,17 +11,17 @@ from models.engines.assembly import Assembly
 from models.systems.pitch_plane.tangent import TangentPath as ErrorPath
 from models.systems.pitch_plane.tangent import noise_covariances
 from validation.hard_cases import setups
-from validation.hard_cases.case import Case
+from validation.hard_cases.case import HardCase
 
 SAMPLE_PERIOD, SAMPLES, STEP = 0.05, 10, 1e-3
 """Period (s) of the held force samples, 35 times the decay time of the fastest pole; number of samples; step (s)."""
 
 
-def _base_assembly(values: np.ndarray) -> Assembly:
-    """The linearised vehicle under its weight, with ``values`` (n, 2) in N added to its wheel force samples."""
+def _base_assembly(added_forces: np.ndarray) -> Assembly:
+    """The linearised vehicle under its weight, with ``added_forces`` (n, 2) in N added to its wheel force samples."""
     base = setups.vehicle(geometry="linear")
     forces = setups.static_forces(base, SAMPLES, SAMPLE_PERIOD)
-    return setups.driven_by_forces(base, replace(forces, values=forces.values + values))
+    return setups.driven_by_forces(base, replace(forces, values=forces.values + added_forces))
 
 
 def covariance_error(engine_name: str, work_folder: Path) -> float:
@@ -46,7 +46,7 @@ def _covariance_recursion() -> np.ndarray:
     return noise_covariances(ErrorPath(assembly, assembly.input, round(SAMPLE_PERIOD / STEP), SAMPLES), 1.0)[-1]
 
 
-def van_loan_naive(work_folder: Path) -> str:
+def van_loan_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: process noise over one and over twenty periods by filterpy's van Loan
     discretisation."""
     from filterpy.common import van_loan_discretization
@@ -69,7 +69,7 @@ def van_loan_naive(work_folder: Path) -> str:
 
 
 CASES = (
-    Case(
+    HardCase(
         "covariance beside a stiff pole",
         "noise held over 50 ms, 35 times the decay time of a pole at -697 1/s: a block exponential overflows",
         "each sample alone, squared and summed",
@@ -77,7 +77,7 @@ CASES = (
         1e-9,
         "the same sum in another order, rounding aside",
         covariance_error,
-        naive=van_loan_naive,
+        naive_result=van_loan_naive_result,
         answer_independence="native",
     ),
 )

@@ -7,7 +7,7 @@ import numpy as np
 
 from models.engines.assembly import Assembly
 from validation.hard_cases import setups
-from validation.hard_cases.case import Case
+from validation.hard_cases.case import HardCase
 from validation.hard_cases.setups import REFUSED, exact_states, largest_magnitude, run, unchecked_run, vehicle
 
 IMPLICIT_INTEGRATORS = {**setups.IMPLICIT_INTEGRATORS, "reference": "LSODA"}
@@ -88,7 +88,7 @@ def stiff_tyre_implicit_error(engine_name: str, work_folder: Path) -> float:
     return _distance_from_equilibrium(engine_name, vehicle(k1=1e9, k2=1e9), IMPLICIT_INTEGRATORS[engine_name])
 
 
-def stiff_tyre_naive(work_folder: Path) -> str:
+def stiff_tyre_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: two steps with the check bypassed."""
     base = vehicle(k1=1e9, k2=1e9)
     end = unchecked_run("mujoco", _raised_vehicle(base), 1e-3, 2e-3).states[-1]
@@ -99,7 +99,7 @@ AT_REST_REASON = "the vehicle is back in its equilibrium after 3 s"
 DECAYED_REASON = "the slowest mode, -10 1/s, has shrunk to 1e-13; first-order steps damp it a little less"
 
 CASES = (
-    Case(
+    HardCase(
         "no damping",
         "poles on the imaginary axis: nothing forgives a method that adds energy",
         "matrix exponential, 1 s",
@@ -110,7 +110,7 @@ CASES = (
         {},
         undamped_unchecked_euler,
     ),
-    Case(
+    HardCase(
         "no damping, first order",
         "explicit Euler adds energy at every step. The reference runs RK4; MuJoCo's Euler is symplectic here",
         "matrix exponential, or refused",
@@ -120,7 +120,7 @@ CASES = (
         undamped_euler_error,
         {"exudyn": "refused"},
     ),
-    Case(
+    HardCase(
         "mass ratio 1e6",
         "a light wheel on a stiff damper: poles at -1.4e7 1/s",
         AT_REST_REASON,
@@ -130,7 +130,7 @@ CASES = (
         light_wheel_error,
         REFUSED,
     ),
-    Case(
+    HardCase(
         "mass ratio 1e6, implicit",
         "one step spans 14,000 time constants",
         AT_REST_REASON,
@@ -139,7 +139,7 @@ CASES = (
         DECAYED_REASON,
         light_wheel_implicit_error,
     ),
-    Case(
+    HardCase(
         "stiffness 1e9",
         "wheels at 8,200 rad/s",
         AT_REST_REASON,
@@ -148,9 +148,9 @@ CASES = (
         DECAYED_REASON,
         stiff_tyre_error,
         REFUSED,
-        stiff_tyre_naive,
+        stiff_tyre_naive_result,
     ),
-    Case(
+    HardCase(
         "stiffness 1e9, implicit",
         "one step spans 1.3 periods of the wheel",
         AT_REST_REASON,

@@ -12,7 +12,7 @@ from models.engines.assembly import Assembly, Mode
 from models.engines.protocol import build
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build as build_scene
-from validation.hard_cases.case import Case
+from validation.hard_cases.case import HardCase
 from validation.hard_cases.setups import (
     driven_by_forces,
     largest_magnitude,
@@ -24,7 +24,7 @@ from validation.hard_cases.setups import (
 )
 
 VEHICLES = ("itwm_drift", "asymmetric_twin")
-G = 9.81
+GRAVITY = 9.81
 
 
 def motion_at_rest(engine_name: str, work_folder: Path) -> float:
@@ -38,9 +38,9 @@ def motion_at_rest(engine_name: str, work_folder: Path) -> float:
     return worst
 
 
-def rest_naive(work_folder: Path) -> str:
+def rest_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: motion of a vehicle that starts at zero, with unstressed springs."""
-    base = vehicle(initial=np.zeros(8))
+    base = vehicle(start_state=np.zeros(8))
     fall = largest_magnitude(run("reference", base, 1e-3, 2.0).states[:, 4:7])
     return f"a start from the coordinates' zero falls at up to {fall:.2f} m/s"
 
@@ -52,8 +52,8 @@ def loads_at_rest(engine_name: str, work_folder: Path) -> float:
         base = vehicle(parameters)
         p = base.parameters
         path = simulate(base.scene, engine_name, settings(engine_name, 1e-3, 0.1), base)
-        front = (p.m3 * p.a / (p.a + p.b) + p.m1) * G
-        rear = (p.m3 * p.b / (p.a + p.b) + p.m2) * G
+        front = (p.m3 * p.a / (p.a + p.b) + p.m1) * GRAVITY
+        rear = (p.m3 * p.b / (p.a + p.b) + p.m2) * GRAVITY
         for name, load in (("f1", front), ("f2", rear)):
             worst = max(worst, largest_magnitude(path[name] - load))
     return worst
@@ -108,7 +108,7 @@ def momentum_error(engine_name: str, work_folder: Path) -> float:
     momentum I b' - m1 b z1' + m2 a z2' from the integrals of the forces."""
     base = vehicle("asymmetric_twin", "linear")
     p = base.parameters
-    forces = static_forces(base, 1000, 1e-3, noise=800.0)
+    forces = static_forces(base, 1000, 1e-3, noise_deviation=800.0)
     rates = run(engine_name, driven_by_forces(base, forces), 1e-3, 1.0).states[:, 4:]
     t = 1e-3 * np.arange(1001)[:, None]
     pushed = np.vstack((np.zeros(2), np.cumsum(forces.values * 1e-3, axis=0)))
@@ -127,7 +127,7 @@ def free_heave_error(engine_name: str, work_folder: Path) -> float:
     from the external forces divided by the mass."""
     base = vehicle("asymmetric_twin")
     p = base.parameters
-    forces = static_forces(base, 100, 1e-3, noise=2000.0)
+    forces = static_forces(base, 100, 1e-3, noise_deviation=2000.0)
     model = build(engine_name, driven_by_forces(base, forces), settings(engine_name, 1e-3, 0.1))
     masses, worst, size = np.array([p.m1, p.m2, p.m3]), 0.0, 0.0
     for i, state in enumerate(np.random.default_rng(6).uniform(-1, 1, (50, 8)) * [0.5, 0.5, 0.5, 3, 3, 3, 3, 3]):
@@ -163,7 +163,7 @@ def tumbling_error(engine_name: str, work_folder: Path) -> float:
     return largest_magnitude(states - truth)
 
 
-def tumbling_naive(work_folder: Path) -> str:
+def tumbling_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: the same scene in linear geometry."""
     ends = [run("reference", _spinning_assembly(geometry), 1e-3, 1.0).states[-1, 3] for geometry in ("exact", "linear")]
     return f"exact geometry turns to {ends[0]:.2f} rad, the linear one says {ends[1]:.2f} rad"
@@ -205,14 +205,14 @@ def body_frame_growth(engine_name: str, work_folder: Path) -> float:
     return pitch_error_growth(engine_name, "force-body")
 
 
-def body_frame_naive(work_folder: Path) -> str:
+def body_frame_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: the body-fixed forces are applied as vertical ones."""
     factor = pitch_error_growth("reference", "force")
     return f"vertical forces let the error grow {factor:.0f}-fold in {DRIVE_DURATION:.0f} s"
 
 
 CASES = (
-    Case(
+    HardCase(
         "static equilibrium",
         "gravity, preload and the zero of the coordinates must fit together",
         "nothing moves for 2 s, both vehicles and geometries",
@@ -221,9 +221,9 @@ CASES = (
         "rounding of kN on kg: 1e-13 m/s^2 held down by the dampers",
         motion_at_rest,
         {},
-        rest_naive,
+        rest_naive_result,
     ),
-    Case(
+    HardCase(
         "+z is down",
         "engines think z up; a wrong sign mirrors the vehicle",
         "static tyre loads, 3825.9 N each",
@@ -232,7 +232,7 @@ CASES = (
         "rounding of 4 kN",
         loads_at_rest,
     ),
-    Case(
+    HardCase(
         "nose up",
         "sign of pitch, places of the axles",
         "accelerations of a tilted vehicle written out by hand",
@@ -241,7 +241,7 @@ CASES = (
         "a preload of 4 kN cancels to 10 N",
         nose_up_error,
     ),
-    Case(
+    HardCase(
         "nothing but what is described",
         "engines add gravity, inertia from density and contacts on their own",
         "a push at one wheel: 100 N / its mass, and no other acceleration",
@@ -250,7 +250,7 @@ CASES = (
         "a preload of 4 kN cancels to nothing",
         push_error,
     ),
-    Case(
+    HardCase(
         "more force in front",
         "a moment that lifts the nose must lift it",
         "front up, pitch up, and the tight solution",
@@ -260,7 +260,7 @@ CASES = (
         raised_front_error,
         answer_independence="native",
     ),
-    Case(
+    HardCase(
         "momentum",
         "both momenta ignore springs and dampers, so a stiff error cannot hide",
         "impulse of the forces",
@@ -269,7 +269,7 @@ CASES = (
         "a thousand additions of doubles",
         momentum_error,
     ),
-    Case(
+    HardCase(
         "unconstrained heave",
         "a free vehicle has four zero eigenvalues; hidden damping would look like stability",
         "centre of mass: sum of external forces / mass",
@@ -278,7 +278,7 @@ CASES = (
         "internal forces of 1e5 N cancel",
         free_heave_error,
     ),
-    Case(
+    HardCase(
         "tumbling",
         "pitch far beyond 90 degrees: sin and cos, signs of the arms",
         "order 8, tolerance 1e-12",
@@ -287,10 +287,10 @@ CASES = (
         "RK4 at 0.25 ms; the wheels start 8 m/s off the struts' ends and are caught within 1.5 ms",
         tumbling_error,
         {},
-        tumbling_naive,
+        tumbling_naive_result,
         answer_independence="native",
     ),
-    Case(
+    HardCase(
         "forces in the body's frame",
         "vertical forces at rotating arms make the pitch unstable; body-fixed ones do not",
         "a pitch error of 1e-6 rad does not double in 8 s",
@@ -299,7 +299,7 @@ CASES = (
         "1 for massless wheels; the wheels' own mass holds the pitch weakly, so an error may also shrink",
         body_frame_growth,
         {},
-        body_frame_naive,
+        body_frame_naive_result,
         answer_independence="none",
     ),
 )

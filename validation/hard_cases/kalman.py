@@ -18,7 +18,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from models.systems.pitch_plane.virtual_measurement import write_wheel_forces
 from validation.drift.kalman_runs import relative_state_matrices
-from validation.hard_cases.case import Case
+from validation.hard_cases.case import HardCase
 from validation.hard_cases.setups import REFUSED, driven_by_forces, largest_magnitude, static_forces, vehicle
 
 SAMPLE_PERIOD, DURATION = 5e-3, 6.0
@@ -29,12 +29,12 @@ SLOW_PERIOD = 0.1
 
 
 def _largest_pitch_error(
-    engine_name: str, work_folder: Path, lost_samples: slice, turn_deviation: float = 0.0, **options: Any
+    engine_name: str, work_folder: Path, lost_samples: slice, start_pitch_error: float = 0.0, **filter_options: Any
 ) -> float:
     """Largest pitch error divided by its stated deviation for a vehicle at rest, with the pitch missing in the
     ``lost_samples`` samples.
 
-    The filter starts from a pitch that is ``turn_deviation`` (rad) wrong.
+    The filter starts from a pitch that is ``start_pitch_error`` (rad) wrong.
     """
     count = round(DURATION / SAMPLE_PERIOD) + 1
     base = vehicle()
@@ -44,7 +44,7 @@ def _largest_pitch_error(
     measured_pitch[lost_samples] = np.nan
     write_time_series(work_folder / "pitch.csv", {"pitch": ("rad", measured_pitch)}, SAMPLE_PERIOD)
     p, start = base.parameters, base.initial.copy()
-    start[[0, 1, 3]] += turn_deviation * np.array([-p.b, p.a, 1.0])
+    start[[0, 1, 3]] += start_pitch_error * np.array([-p.b, p.a, 1.0])
     scene = build(
         {
             "title": "kalman",
@@ -53,7 +53,12 @@ def _largest_pitch_error(
             "effects": {
                 "wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"},
                 "force_noise": {"deviation": FORCE, "seed": 7},
-                "kalman_filter": {"file": "pitch.csv", "force_deviation": FORCE, "pitch_deviation": ANGLE, **options},
+                "kalman_filter": {
+                    "file": "pitch.csv",
+                    "force_deviation": FORCE,
+                    "pitch_deviation": ANGLE,
+                    **filter_options,
+                },
             },
         },
         "kalman",
@@ -70,7 +75,7 @@ def outage_error(engine_name: str, work_folder: Path) -> float:
     return _largest_pitch_error(engine_name, work_folder, slice(200, 900))
 
 
-def outage_naive(work_folder: Path) -> str:
+def outage_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: the filter library's own update with a NaN."""
     kalman = ExtendedKalmanFilter(2, 1)
     kalman.x = np.zeros(2)
@@ -136,7 +141,7 @@ def stiff_process_noise_error(engine_name: str, work_folder: Path) -> float:
     return float(np.linalg.norm(early @ early.T - wanted @ wanted.T) / np.linalg.norm(wanted @ wanted.T))
 
 
-def stiff_naive(work_folder: Path) -> str:
+def stiff_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: process noise of the stiff vehicle by filterpy's discretisation."""
     a, b, wanted = _exact_response()
     noise = van_loan_discretization(a, b * np.sqrt(SLOW_PERIOD), SLOW_PERIOD)[1]
@@ -151,7 +156,7 @@ def stiff_naive(work_folder: Path) -> str:
 
 
 CASES = (
-    Case(
+    HardCase(
         "pitch measurement with an outage",
         "3.5 s without a number, during which the vehicle drifts freely",
         "the true pitch, by the deviation that the filter states",
@@ -160,9 +165,9 @@ CASES = (
         "Gaussian: 5 deviations are left once in 1.7 million",
         outage_error,
         {},
-        outage_naive,
+        outage_naive_result,
     ),
-    Case(
+    HardCase(
         "filter from a wrong start",
         "vehicle and filter begin 0.2 rad from where the true one is",
         "the true pitch after 1 s, by the deviation that the filter states",
@@ -171,7 +176,7 @@ CASES = (
         "Gaussian: 5 deviations are left once in 1.7 million",
         wrong_start_error,
     ),
-    Case(
+    HardCase(
         "filter told of angles to a billionth",
         "R = 1e-18 beside P = 1: subtracted covariances lose all digits",
         "the true pitch by the stated deviation, eigenvalues of the scaled covariance above -1e-6",
@@ -179,9 +184,9 @@ CASES = (
         5.0,
         "Gaussian: 5 deviations are left once in 1.7 million",
         certain_start_error,
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "pitch measurement without a number",
         "a column of NaN",
         "refused",
@@ -191,7 +196,7 @@ CASES = (
         empty_column_error,
         REFUSED,
     ),
-    Case(
+    HardCase(
         "process noise of a stiff vehicle",
         "forces at 10 Hz, a pole of -697 1/s",
         "the response to a held force by the matrix exponential",
@@ -200,6 +205,6 @@ CASES = (
         "Runge-Kutta in substeps of 1 ms; the fast modes have settled",
         stiff_process_noise_error,
         {},
-        stiff_naive,
+        stiff_naive_result,
     ),
 )

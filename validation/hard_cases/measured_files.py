@@ -7,7 +7,7 @@ import numpy as np
 
 from models.measured.formats.mdf4 import opened_mdf as mdf4_opened
 from models.measured.formats.tdms import BoundedFile, opened_tdms
-from validation.hard_cases.case import IMPLEMENTATIONS, Case
+from validation.hard_cases.case import IMPLEMENTATIONS, HardCase
 from validation.measured.measured_files import csv, csv_forms, kinds, mdf4, rpc3, tdms
 from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, CutSweep, OddFile, file_of_bytes
 
@@ -40,40 +40,40 @@ def nptdms_on_cut_segment(work_folder: Path) -> str:
     return f"npTDMS hands over channels of {' and '.join(map(str, lengths))} samples"
 
 
-NAIVE = {
+NAIVE_RESULTS = {
     "CSV cut within a number": numpy_on_cut_number,
     "MDF 4 with invalid samples": asammdf_on_invalid_samples,
     "TDMS cut in its samples": nptdms_on_cut_segment,
 }
 
 
-def case_of_file(odd: OddFile) -> Case:
+def case_of_file(odd_file: OddFile) -> HardCase:
     """Hard case made from an odd measurement file."""
-    return Case(
-        name=odd.name,
-        difficulty=odd.difficulty,
-        exact_answer=CHECKS[odd.expected_outcome],
+    return HardCase(
+        name=odd_file.name,
+        difficulty=odd_file.difficulty,
+        exact_answer=CHECKS[odd_file.expected_outcome],
         unit="s or N",
         tolerance=TOLERANCE,
         tolerance_reason="values have bits that every format keeps; CSV writes times with 15 digits",
-        error=lambda _, folder: odd.error(folder / "odd"),
-        expected=dict.fromkeys(IMPLEMENTATIONS, "refused") if odd.expected_outcome == "refused" else {},
-        naive=NAIVE.get(odd.name),
-        without_engine=True,
+        error_function=lambda _, folder: odd_file.error(folder / "odd"),
+        expected_outcomes=dict.fromkeys(IMPLEMENTATIONS, "refused") if odd_file.expected_outcome == "refused" else {},
+        naive_result=NAIVE_RESULTS.get(odd_file.name),
+        is_without_engine=True,
     )
 
 
-def case_of_sweep(sweep: CutSweep) -> Case:
+def case_of_sweep(cut_sweep: CutSweep) -> HardCase:
     """Hard case made from a file that is cut off at many positions."""
-    return Case(
-        name=f"{sweep.extension} cut off at {sweep.cuts} places",
+    return HardCase(
+        name=f"{cut_sweep.extension} cut off at {cut_sweep.cuts} places",
         difficulty="a library reads what is left, or what is not there",
         exact_answer="every cut is refused, or what is left is right and the cut named",
         unit="silent cuts",
         tolerance=0.0,
         tolerance_reason="no file that was cut off may be used without a word",
-        error=lambda _, folder: sweep.silent_cuts(folder / "cut"),
-        without_engine=True,
+        error_function=lambda _, folder: cut_sweep.silent_cuts(folder / "cut"),
+        is_without_engine=True,
     )
 
 

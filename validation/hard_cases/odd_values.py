@@ -35,7 +35,7 @@ from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases.between_steps import REFUSED, refused_case
-from validation.hard_cases.case import Case
+from validation.hard_cases.case import HardCase
 
 FRICTION, CELLS = 0.3, 15
 
@@ -46,22 +46,22 @@ def long_wave_error(engine_name: str, work_folder: Path) -> float:
 
     The longer waves reach up to 10 m, from which cars that began at 0 would fall.
     """
-    deviations = [_run_copies(corner).deviation for corner in (1e-6, 0.1)]
+    deviations = [_monte_carlo_run(corner).deviation for corner in (1e-6, 0.1)]
     return float(np.abs(deviations[0] / deviations[1] - 1.0).max())
 
 
-def _run_copies(corner: float) -> Any:
-    vehicle, road = _vehicle_and_road(corner)
+def _monte_carlo_run(corner_wavenumber: float) -> Any:
+    vehicle, road = _vehicle_and_road(corner_wavenumber)
     return copies_in_time(vehicle, road, 5.0, 1.0, copies=20, seed=1, longest_step=2e-3)
 
 
-def _vehicle_and_road(corner: float) -> tuple[SpatialVehicle, Excitation]:
+def _vehicle_and_road(corner_wavenumber: float) -> tuple[SpatialVehicle, Excitation]:
     scene = build(
         {
             "title": "hard",
             "system": "ride",
             "vehicle": {"file": "quarter_car_nonlinear"},
-            "road": {"level": 6.4e-5, "corner_mean": corner, "corner_roll": corner},
+            "road": {"level": 6.4e-5, "corner_mean": corner_wavenumber, "corner_roll": corner_wavenumber},
             "speeds": {"start": 5.0, "stop": 6.0},
         }
     )
@@ -134,11 +134,11 @@ def rounded_profile() -> Any:
     return profile(rail.y.round(4), rail.z.round(4))
 
 
-MASKED = np.ma.array([0.0, 100.0, 0.0, 1.0, 0.0], mask=np.arange(5) == 1)
-SKEW = np.array([[1.0, 2.0], [0.0, 1.0]])
-STABLE = np.array([[0.0, 1.0], [-4.0, -0.5]])
+MASKED_SAMPLES = np.ma.array([0.0, 100.0, 0.0, 1.0, 0.0], mask=np.arange(5) == 1)
+SKEW_MATRIX = np.array([[1.0, 2.0], [0.0, 1.0]])
+STABLE_MATRIX = np.array([[0.0, 1.0], [-4.0, -0.5]])
 CASES = (
-    Case(
+    HardCase(
         "road that begins 10 m up",
         "vehicles let go at 0 fall onto it and ring for long",
         "as on one without its long waves",
@@ -146,9 +146,9 @@ CASES = (
         0.02,
         "waves of 60 m at 0.1 Hz",
         long_wave_error,
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "narrow contact",
         "an ellipse 20 times as wide as long: FASTSIM's moment is two and a half times too large",
         "within its stated error of the exact theory",
@@ -156,9 +156,9 @@ CASES = (
         1.0,
         "exact",
         slender_ellipse_case(5e-4, 1e-2),
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "drift-off time under tiny noise",
         "squares of angles underflow",
         "the same by scaling",
@@ -166,9 +166,9 @@ CASES = (
         1e-12,
         "rounding",
         scaled_drift_off_error,
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "filter of tilts told of them to 1e-12",
         "subtracted covariances leave less than nothing",
         "surer than each value, never less",
@@ -176,9 +176,9 @@ CASES = (
         1.0 + 1e-9,
         "rounding",
         overconfident_filter_ratio,
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "saved result with a flipped bit",
         "every number of it is plausible",
         "refused",
@@ -187,14 +187,14 @@ CASES = (
         "exact",
         flipped_bit_error,
         REFUSED,
-        without_engine=True,
+        is_without_engine=True,
     ),
     *(
-        Case(name, hard, "refused", "", 0.0, "exact", refused_case(answer), REFUSED, without_engine=True)
+        HardCase(name, hard, "refused", "", 0.0, "exact", refused_case(answer), REFUSED, is_without_engine=True)
         for name, hard, answer in (
             ("profile with a spike", "a spline swings about it", profile_with_spike),
             ("profile rounded to 0.1 mm", "the half beyond the first step back would be lost", rounded_profile),
-            ("masked samples", "would be counted", lambda: pseudo_damage(MASKED)),
+            ("masked samples", "would be counted", lambda: pseudo_damage(MASKED_SAMPLES)),
             ("load below 0 under a wheel", "its factor would be negative", lambda: dynamic_load_factor(100.0, -4000.0)),
             ("limit below 0", "a share of time above 1", lambda: time_share_beyond(1.0, -1.0)),
             ("deviation of two values", "its error would be 0", lambda: deviation_with_error(np.array([1.0, 2.0]))),
@@ -206,9 +206,13 @@ CASES = (
             (
                 "covariance of what grows",
                 "Lyapunov's equation has an answer, which is none",
-                lambda: lyapunov_solution(-STABLE, np.eye(2)),
+                lambda: lyapunov_solution(-STABLE_MATRIX, np.eye(2)),
             ),
-            ("right side that is askew", "another one would be solved", lambda: lyapunov_solution(STABLE, SKEW)),
+            (
+                "right side that is askew",
+                "another one would be solved",
+                lambda: lyapunov_solution(STABLE_MATRIX, SKEW_MATRIX),
+            ),
             ("point mass of nothing", "divided by", lambda: euler_covariance(10, 1.0, 1e-3, 0.0)),
         )
     ),

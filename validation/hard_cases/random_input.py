@@ -30,7 +30,7 @@ from models.sensors.rotations import rotation_matrix
 from models.systems.ride.of_scene import linear_vehicle
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases import setups
-from validation.hard_cases.case import Case
+from validation.hard_cases.case import HardCase
 from validation.hard_cases.setups import driven_by_forces, largest_magnitude, settings, static_forces
 
 NORMAL_LIMIT = 3.29
@@ -45,7 +45,7 @@ def repeated_call_difference(engine_name: str, work_folder: Path) -> float:
     """Case: accelerations with force noise of 800 N, evaluated forwards, backwards and twice in time. Error: largest
     difference, which must be 0."""
     base = setups.vehicle("asymmetric_twin")
-    forces = static_forces(base, 200, 1e-3, noise=800.0)
+    forces = static_forces(base, 200, 1e-3, noise_deviation=800.0)
     model = build(engine_name, driven_by_forces(base, forces), settings(engine_name, 1e-3, 0.1))
     states = base.initial + 1e-3 * np.random.default_rng(3).standard_normal((40, 8))
     arguments_of_calls = [(2e-3 * i, state[:4], state[4:]) for i, state in enumerate(states)]
@@ -92,7 +92,7 @@ def stream_piece_error(engine_name: str, work_folder: Path) -> float:
     return float(np.abs(np.concatenate(parts[::-1]) - complete_stream).max())
 
 
-def _one_state() -> Excitation:
+def _first_order_road() -> Excitation:
     return Excitation(np.array([[-CORNER]]), np.array([[Q**0.5]]), (np.ones((1, 1)),), (0.0,))
 
 
@@ -104,15 +104,15 @@ def road_variance_error(engine_name: str, work_folder: Path) -> float:
         keeps = np.exp(
             -2.0 * step_share
         )  # squared correlation of neighbours: n samples count as n (1 - keeps) / (1 + keeps)
-        road = RoadPath(_one_state(), SPEED, step_share / (CORNER * SPEED)).wheel_heights_and_rates(20_000, seed=12)[
-            :, 0
-        ]
+        road = RoadPath(_first_order_road(), SPEED, step_share / (CORNER * SPEED)).wheel_heights_and_rates(
+            20_000, seed=12
+        )[:, 0]
         error = (2.0 / len(road) * (1.0 + keeps) / (1.0 - keeps)) ** 0.5
         worst = max(worst, abs(float(np.mean(road**2)) / (Q / (2.0 * CORNER)) - 1.0) / error)
     return worst
 
 
-def any_step_naive(work_folder: Path) -> str:
+def any_step_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: variance by explicit Euler, which is 1 / (1 - part / 2) of the true one."""
     return f"explicit Euler at 0.9 corner lengths has {1.0 / (1.0 - 0.45):.2f} times the variance, at 2.5 none at all"
 
@@ -123,7 +123,7 @@ def axle_delay_error(engine_name: str, work_folder: Path) -> float:
     worst = 0.0
     for length, speed, longest in ((2.7, 31.0, 0.02), (3.1415926, 17.3, 0.0055), (1.234567, 0.37, 0.001)):
         heights = (np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]]))
-        road = road_path(replace(_one_state(), heights=heights, lengths=(0.0, length)), speed, longest)
+        road = road_path(replace(_first_order_road(), heights=heights, lengths=(0.0, length)), speed, longest)
         steps = int(2.0 * length / (speed * road.step)) + 50
         front, rear = road.wheel_heights_and_rates(steps, seed=3)[:, :2].T
         lag = next((i for i in range(1, len(front)) if np.array_equal(rear[i : i + 20], front[:20])), 0)
@@ -131,7 +131,7 @@ def axle_delay_error(engine_name: str, work_folder: Path) -> float:
     return worst
 
 
-def odd_delay_naive(work_folder: Path) -> str:
+def odd_delay_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: distance between the axles if the delay is rounded to steps of 20 ms."""
     length, speed, step = 2.7, SPEED, 0.02
     lag = round(length / (speed * step)) * speed * step
@@ -150,7 +150,7 @@ def attitude_error(engine_name: str, work_folder: Path) -> float:
     return abs(float(traces.mean()) - wanted) / (float(traces.std()) / PATHS**0.5)
 
 
-def attitude_naive(work_folder: Path) -> str:
+def attitude_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: norm of a quaternion that is integrated by explicit Euler."""
     turns = WALK / SAMPLING_RATE**0.5 * np.stack([normal_samples(5, path, SAMPLES, 3) for path in range(PATHS)], axis=1)
     q = euler_quaternions(turns, np.array([1.0, 0.0, 0.0, 0.0]))
@@ -166,18 +166,18 @@ def growth_law_error(engine_name: str, work_folder: Path) -> float:
     worst = 0.0
     for x in (1e-12, 1e-6, 1e-3, 0.0999, SERIES_LIMIT, np.nextafter(SERIES_LIMIT, 1.0), 0.1001, 0.5, 1.0, 10.0, 600.0):
         variance = float(pitch_variance(2.0, x / 4.0, 0.7))
-        worst = max(worst, abs(variance / _exact_law(Decimal(x)) - 1.0))
+        worst = max(worst, abs(variance / _exact_growth_law(Decimal(x)) - 1.0))
     return max(worst, abs(float(pitch_variance(2.0, 0.0, 0.7)) / (0.7 * 8.0 / 3.0) - 1.0))
 
 
-def _exact_law(x: Decimal) -> float:
+def _exact_growth_law(x: Decimal) -> float:
     with localcontext() as context:
         context.prec = 60
         sinh = (x.exp() - (-x).exp()) / 2
         return float(Decimal("0.7") * 8 / 3 * 6 * (sinh - x) / x**3)
 
 
-def no_growth_naive(work_folder: Path) -> str:
+def no_growth_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: the variance without growth by the formula as printed."""
     x = 1e-8
     return f"the closed law as printed is {6.0 * (np.sinh(x) - x) / x**3:.2f} times the truth at 2 lambda t = 1e-8"
@@ -202,7 +202,7 @@ def negative_eigenvalue_share(engine_name: str, work_folder: Path) -> float:
 
 
 CASES = (
-    Case(
+    HardCase(
         "accelerations asked again",
         "noise drawn inside a callback changes from one stage to the next",
         "the same time and state, the same bits",
@@ -211,7 +211,7 @@ CASES = (
         "a function has no memory",
         repeated_call_difference,
     ),
-    Case(
+    HardCase(
         "streams of noise",
         "one seed for forces, gyro and road, two for two runs, one path for front and rear",
         "no correlation of any two of 15",
@@ -220,9 +220,9 @@ CASES = (
         "once in 5000 by chance, fixed seeds",
         stream_correlation,
         answer_independence="none",
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "stream in pieces",
         "blocks may be asked for in any order by any worker",
         "the whole, bit by bit",
@@ -231,9 +231,9 @@ CASES = (
         "the same numbers",
         stream_piece_error,
         answer_independence="none",
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "shape filter at any step",
         "explicit Euler has 1 / (1 - a h / 2) of the variance",
         "q / (2 corner) at half steps of 0.001 to 30 corner lengths",
@@ -241,10 +241,10 @@ CASES = (
         NORMAL_LIMIT + 0.6,
         "once in a thousand by chance in five lengths, fixed seed",
         road_variance_error,
-        naive=any_step_naive,
-        without_engine=True,
+        naive_result=any_step_naive_result,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "delay between steps",
         "the wheelbase is no whole number of steps",
         "the rear axle meets the front one's heights, its wheelbase later",
@@ -252,10 +252,10 @@ CASES = (
         1e-3,
         "the tolerance of the cells of the path",
         axle_delay_error,
-        naive=odd_delay_naive,
-        without_engine=True,
+        naive_result=odd_delay_naive_result,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "white noise on a gyro",
         "Ito and Stratonovich differ, and a quaternion grows",
         "E[tr E] = 3 exp(-s^2 t) on a turning body",
@@ -263,10 +263,10 @@ CASES = (
         NORMAL_LIMIT,
         "once in a thousand, fixed seed",
         attitude_error,
-        naive=attitude_naive,
-        without_engine=True,
+        naive_result=attitude_naive_result,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "growth law at no growth",
         "sinh x - x loses all digits where the exponent 3/2 begins",
         "60 digits, for 2 lambda t from 0 to 600",
@@ -274,10 +274,10 @@ CASES = (
         1e-12,
         "rounding of sinh x - x at x = 0.1 is 6e-14",
         growth_law_error,
-        naive=no_growth_naive,
-        without_engine=True,
+        naive_result=no_growth_naive_result,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "delayed axle in Lyapunov's equation",
         "its right side is indefinite: roots of it do not exist",
         "the covariance is positive semidefinite at 2 to 60 m/s",

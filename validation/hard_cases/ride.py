@@ -21,7 +21,7 @@ from models.ride.varying_speed import varying_speed
 from models.ride.weighting import WEIGHTINGS, system_with_weightings
 from models.vehicles.linear_vehicle import LinearVehicle, eigenvalues
 from models.vehicles.vehicle_file import SHIPPED_FOLDER, build_vehicle, load_vehicle
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
+from validation.hard_cases.case import IMPLEMENTATIONS, HardCase, OutcomeWord
 from validation.ride.hard_rides import (
     QUARTER_CAR_NUMBERS,
     SPEED,
@@ -34,7 +34,7 @@ from validation.ride.hard_rides import (
 )
 from validation.ride.rides import ROAD_INTENSITY, largest_relative_error, one_track, paper_road
 
-Change = Callable[[dict[str, Any]], object]
+VehicleTableChange = Callable[[dict[str, Any]], object]
 
 
 def damped_tyre_error(engine_name: str, work_folder: Path) -> float:
@@ -50,7 +50,7 @@ def damped_tyre_error(engine_name: str, work_folder: Path) -> float:
     return largest_relative_error(covariance.variance[:2], variances_by_quadrature(vehicle, road, SPEED).variance[:2])
 
 
-def damped_tyre_naive(work_folder: Path) -> str:
+def damped_tyre_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: variances by the Lyapunov equation if the white noise that reaches outputs
     directly is ignored."""
     system = vehicle_with_road(
@@ -83,18 +83,18 @@ def growth_rate_error(engine_name: str, work_folder: Path) -> float:
     return largest_relative_error(grown, covariance.rate)
 
 
-def undamped_case(corner: float) -> Callable[..., float]:
+def undamped_case(corner_wavenumber: float) -> Callable[..., float]:
     """Case: a body on an undamped tyre. Error: that of the growth rates of its variances, against S(w) / 2 w^2."""
 
     def error(engine_name: str, work_folder: Path) -> float:
         undamped_car = replace(single_body(300.0, 2e5, 0.0), springs=())
         covariance = stationary_covariance(
-            vehicle_with_road(linear_equations(undamped_car, engine_name), one_track((0.0,), corner), SPEED)
+            vehicle_with_road(linear_equations(undamped_car, engine_name), one_track((0.0,), corner_wavenumber), SPEED)
         )
         if covariance.status != (DIFFUSING, DIFFUSING):
             return np.inf
         w2 = 2e5 / 300.0
-        height = w2 * ROAD_INTENSITY * SPEED / (2.0 * (w2 + (corner * SPEED) ** 2))
+        height = w2 * ROAD_INTENSITY * SPEED / (2.0 * (w2 + (corner_wavenumber * SPEED) ** 2))
         return largest_relative_error(covariance.rate, np.array([w2**2, 1.0]) * height)
 
     return error
@@ -114,7 +114,7 @@ def triple_pole_error(engine_name: str, work_folder: Path) -> float:
     return largest_relative_error(covariance.variance, 3.0 * ROAD_INTENSITY * SPEED / 16.0 * np.array([w**3, 1.0 / w]))
 
 
-def triple_naive(work_folder: Path) -> str:
+def triple_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: condition number of the eigenvectors in this case."""
     system = vehicle_with_road(
         linear_equations(single_body(300.0, 10800.0, 3600.0), "reference"), one_track((0.0,), 0.3), SPEED
@@ -124,20 +124,20 @@ def triple_naive(work_folder: Path) -> str:
     return f"sums over eigenvectors have a condition of {condition:.0e} there"
 
 
-def unstable_car(engine_name: str, work_folder: Path) -> float:
+def unstable_car_error(engine_name: str, work_folder: Path) -> float:
     """Case: a damper with the wrong sign must be refused, with the growth rate of the fastest motion."""
-    return _refused_by_growth(linear_equations(quarter_car(300.0, 40.0, 2e4, -1500.0, 2e5), engine_name))
+    return _error_unless_refused(linear_equations(quarter_car(300.0, 40.0, 2e4, -1500.0, 2e5), engine_name))
 
 
-def toppling_car(engine_name: str, work_folder: Path) -> float:
+def toppling_car_error(engine_name: str, work_folder: Path) -> float:
     """Case: a body 30 m above its springs must be refused, with the rate at which it topples under gravity."""
     car = load_vehicle("seven_freedoms")
     x, y, _ = car.bodies[0].position
     tall = replace(car, gravity=9.81, bodies=(replace(car.bodies[0], position=(x, y, 30.0)), *car.bodies[1:]))
-    return _refused_by_growth(linear_equations(tall, engine_name))
+    return _error_unless_refused(linear_equations(tall, engine_name))
 
 
-def _refused_by_growth(vehicle: LinearVehicle) -> float:
+def _error_unless_refused(vehicle: LinearVehicle) -> float:
     road, growing = paper_road(vehicle.wheels), float(eigenvalues(vehicle).real.max())
     for route in (
         lambda: stationary_covariance(vehicle_with_road(vehicle, road, SPEED)),
@@ -170,9 +170,9 @@ def no_delay_error(engine_name: str, work_folder: Path) -> float:
     return largest_relative_error(delayed, equal)
 
 
-def _deviations_of_ride(vehicle: LinearVehicle, speed: float = SPEED, axles: str = "delayed") -> np.ndarray:
+def _deviations_of_ride(vehicle: LinearVehicle, speed: float = SPEED, axle_correlation: str = "delayed") -> np.ndarray:
     return stationary_covariance(
-        vehicle_with_road(vehicle, paper_road(vehicle.wheels, "modelled", axles), speed)
+        vehicle_with_road(vehicle, paper_road(vehicle.wheels, "modelled", axle_correlation), speed)
     ).deviation
 
 
@@ -211,7 +211,7 @@ def standstill_error(engine_name: str, work_folder: Path) -> float:
     return largest_relative_error((height / height[0]) ** 2, 1.0)
 
 
-def invalid_speeds(engine_name: str, work_folder: Path) -> float:
+def invalid_speeds_error(engine_name: str, work_folder: Path) -> float:
     """Case: speeds of -1, NaN, infinity and 0 must each be refused."""
     vehicle = linear_equations(load_vehicle("half_car"), engine_name)
     for speed in (-1.0, float("nan"), float("inf"), 0.0):
@@ -224,12 +224,12 @@ def invalid_speeds(engine_name: str, work_folder: Path) -> float:
     raise refusal
 
 
-def wrong_entry_case(change: Change, expected_place: str) -> Callable[..., float]:
+def wrong_entry_case(spoil_table: VehicleTableChange, expected_place: str) -> Callable[..., float]:
     """Case: the half car's file with a wrong entry must be refused with the entry's name."""
 
     def error(engine_name: str, work_folder: Path) -> float:
         table = parse(SHIPPED_FOLDER / "half_car.toml")
-        change(table)
+        spoil_table(table)
         try:
             vehicle = build_vehicle(table, "half_car.toml")
         except InputError as refusal:
@@ -241,14 +241,14 @@ def wrong_entry_case(change: Change, expected_place: str) -> Callable[..., float
     return error
 
 
-def _unconnected(table: dict[str, Any]) -> None:
-    table["bodies"].append({"name": "box", "mass": 5.0, "position": [0.0, 0.0, 1.0], "freedoms": ["z"]})
+def _add_unconnected_body(vehicle_table: dict[str, Any]) -> None:
+    vehicle_table["bodies"].append({"name": "box", "mass": 5.0, "position": [0.0, 0.0, 1.0], "freedoms": ["z"]})
 
 
 REFUSED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 CLOSED, ROUNDED = "closed form", "rounding, and that of an engine's differences"
 CASES = (
-    Case(
+    HardCase(
         "tyre damping on a road of first order",
         "the road's rate is white noise: a force without a variance",
         "body by quadrature; tyre force called infinite",
@@ -256,9 +256,9 @@ CASES = (
         1e-9,
         ROUNDED,
         damped_tyre_error,
-        naive=damped_tyre_naive,
+        naive_result=damped_tyre_naive_result,
     ),
-    Case(
+    HardCase(
         "road that walks at random",
         "its height has no variance, the vehicle's motion has one",
         CLOSED,
@@ -267,7 +267,7 @@ CASES = (
         ROUNDED,
         closed_form_error(corner=0.0),
     ),
-    Case(
+    HardCase(
         "road that next to walks at random",
         "a corner of 1e-9 rad/m",
         CLOSED,
@@ -276,7 +276,7 @@ CASES = (
         "counts as none: 2e-8 1/s beside 3 1/s",
         closed_form_error(corner=1e-9),
     ),
-    Case(
+    HardCase(
         "car that is free on the road",
         "three zero eigenvalues, two of them a Jordan pair",
         "exact covariance after an hour",
@@ -285,7 +285,7 @@ CASES = (
         "rounding, doubled twenty times",
         free_car_error,
     ),
-    Case(
+    HardCase(
         "roll steer on a free car",
         "its heading diffuses, its place sideways goes with t^3",
         "exact covariance after 1 and 2 hours",
@@ -294,7 +294,7 @@ CASES = (
         "what is left of its first seconds",
         growth_rate_error,
     ),
-    Case(
+    HardCase(
         "no damping at all",
         "an undamped motion under white noise: Lyapunov's equation has no solution",
         "growth by S(w) / 2 w^2",
@@ -303,7 +303,7 @@ CASES = (
         ROUNDED,
         undamped_case(0.3),
     ),
-    Case(
+    HardCase(
         "no damping, road that next to walks",
         "undamped beside a pole at -2e-8 1/s",
         "growth by S(w) / 2 w^2",
@@ -312,7 +312,7 @@ CASES = (
         ROUNDED,
         undamped_case(1e-9),
     ),
-    Case(
+    HardCase(
         "next to no damping",
         "a damper of 0.1 mN s/m: ratio 2e-8",
         CLOSED,
@@ -321,7 +321,7 @@ CASES = (
         "asked for",
         closed_form_error(c=1e-4),
     ),
-    Case(
+    HardCase(
         "threefold eigenvalue",
         "critical damping at the road's own corner: eigenvectors are parallel",
         CLOSED,
@@ -329,9 +329,9 @@ CASES = (
         1e-9,
         ROUNDED,
         triple_pole_error,
-        naive=triple_naive,
+        naive_result=triple_naive_result,
     ),
-    Case(
+    HardCase(
         "stiffness ratio of 1e9",
         "a tyre of 2e13 N/m on a spring of 2e4 N/m",
         CLOSED,
@@ -340,7 +340,7 @@ CASES = (
         "asked for",
         closed_form_error(k_t=2e13),
     ),
-    Case(
+    HardCase(
         "wheel of a milligram",
         "a rate of 1.5e9 1/s beside one of 1 1/s",
         CLOSED,
@@ -349,7 +349,7 @@ CASES = (
         "asked for",
         closed_form_error(m_u=1e-6),
     ),
-    Case(
+    HardCase(
         "speeds of 1 mm/s and 300 m/s",
         "the road's rates lie five decades apart",
         CLOSED,
@@ -358,7 +358,7 @@ CASES = (
         ROUNDED,
         closed_form_error(speeds=(1e-3, 300.0)),
     ),
-    Case(
+    HardCase(
         "weighting at 1 mm/s",
         "eight states with rates of 600 1/s behind a road of 3e-4 1/s",
         "quadrature",
@@ -367,9 +367,9 @@ CASES = (
         ROUNDED,
         slow_weighting_error,
     ),
-    Case("delay of hours", "e^(A tau) underflows", "independent axles", "", 1e-12, "rounding", long_delay_error),
-    Case("two axles at one place", "a delay of nothing", "one input", "", 0.0, "exact", no_delay_error),
-    Case(
+    HardCase("delay of hours", "e^(A tau) underflows", "independent axles", "", 1e-12, "rounding", long_delay_error),
+    HardCase("two axles at one place", "a delay of nothing", "one input", "", 0.0, "exact", no_delay_error),
+    HardCase(
         "left springs twice the right ones",
         "roll and heave are coupled",
         "its mirror image",
@@ -378,7 +378,7 @@ CASES = (
         ROUNDED,
         mirror_error,
     ),
-    Case(
+    HardCase(
         "drive from stop to stop",
         "path stands still while time goes on",
         "the road's own variance",
@@ -387,29 +387,31 @@ CASES = (
         "rounding",
         standstill_error,
     ),
-    Case(
+    HardCase(
         "damper of the wrong sign",
         "integrals over frequencies stay finite",
         "growth rate",
         "",
         0.0,
         "exact",
-        unstable_car,
+        unstable_car_error,
         REFUSED,
     ),
-    Case(
+    HardCase(
         "top-heavy body under gravity",
         "stable unloaded, toppling loaded",
         "growth rate",
         "",
         0.0,
         "exact",
-        toppling_car,
+        toppling_car_error,
         REFUSED,
     ),
-    Case("no speed", "0, below 0, not a number", "refused by name", "", 0.0, "exact", invalid_speeds, REFUSED),
+    HardCase(
+        "no speed", "0, below 0, not a number", "refused by name", "", 0.0, "exact", invalid_speeds_error, REFUSED
+    ),
     *(
-        Case(
+        HardCase(
             name,
             "a number from a singular or senseless matrix",
             f"refused at {place}",
@@ -424,7 +426,7 @@ CASES = (
             ("mass of zero", "bodies[rl].mass", lambda t: t["bodies"][2].update(mass=0.0)),
             ("missing mass", "bodies[rl].mass", lambda t: t["bodies"][2].pop("mass")),
             ("body without inertia", "bodies[body].inertia", lambda t: t["bodies"][0].pop("inertia")),
-            ("unconnected body", "bodies[box]", _unconnected),
+            ("unconnected body", "bodies[box]", _add_unconnected_body),
             ("output on an unknown body", "outputs[body rear].body", lambda t: t["outputs"][2].update(body="bdoy")),
             ("axle behind axle", "axles[rear].x", lambda t: t["axles"][1].update(x=2.0)),
             ("negative damper in a file", "springs[rear left].damping", lambda t: t["springs"][1].update(damping=-1.0)),
