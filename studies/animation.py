@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.drawing.figures import LABELS
-from studies.pictures.page import Page, difference_sentence, eight_bits
+from studies.pictures.page import FilmPage, difference_sentence, eight_bits
 from studies.pictures.scene import PictureScene
 from studies.pictures.video import missing_extra, write, write_png
 
@@ -30,7 +30,7 @@ def run(
     report_progress(f"{scene.vehicle} in {', '.join(LABELS[engine] for engine in engines)}", 0.0)
     film, vehicle = scene.film, import_module(f"studies.pictures.{scene.vehicle}")
     stage, motions = vehicle.stage_and_motions(film.duration, film.times(), engines)
-    page = Page(stage, motions)
+    page = FilmPage(stage, motions)
     best = page.frame_of_largest_force()
     written = [write_png(output_folder / "page.png", page.frame(best))]
     for motion in motions:
@@ -52,10 +52,10 @@ def run(
 
 
 def _with_progress(
-    frames: Iterator[np.ndarray], frame_count: int, report_progress: ReportProgress
+    frame_images: Iterator[np.ndarray], frame_count: int, report_progress: ReportProgress
 ) -> Iterator[np.ndarray]:
     """Yield the frames, and advance the progress bar at each frame."""
-    for k, frame in enumerate(frames):
+    for k, frame in enumerate(frame_images):
         report_progress(f"frame {k + 1} of {frame_count}", RUN_SHARE + (1.0 - RUN_SHARE) * k / frame_count)
         yield frame
 

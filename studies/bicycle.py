@@ -62,26 +62,30 @@ def eigenvalues(scene: BicycleScene) -> tuple[np.ndarray, np.ndarray]:
     return speeds, np.array([scene.whipple.eigenvalues(float(speed), scene.control) for speed in speeds])
 
 
-def _figures_of_runs(scene: BicycleScene, runs: dict[str, Result]) -> dict[str, Any]:
+def _figures_of_runs(scene: BicycleScene, runs_by_engine: dict[str, Result]) -> dict[str, Any]:
     bicycle = scene.whipple
     figures: dict[str, Any] = {
         "weave speed without control [m/s]": bicycle.weave_speed,
         "capsize speed without control [m/s]": bicycle.capsize_speed,
     }
-    for engine, result in runs.items():
+    for engine, result in runs_by_engine.items():
         figures[f"largest lean, {engine} [rad]"] = float(np.abs(result["lean"]).max())
         figures[f"energy unaccounted for, {engine}"] = result.detail.unaccounted()
     return figures
 
 
-def _run_line(engine: str, result: Result) -> str:
-    lean, steer = (np.abs(result[name]).max() for name in ("lean", "steer"))
-    gap = result.detail.unaccounted()
+def _run_line(engine: str, engine_run: Result) -> str:
+    lean, steer = (np.abs(engine_run[name]).max() for name in ("lean", "steer"))
+    gap = engine_run.detail.unaccounted()
     return f"    {engine:<12}largest lean {lean:.5f} rad, steer {steer:.5f} rad; energy unaccounted for {gap:.1e}"
 
 
 def figure(
-    scene: BicycleScene, speeds: np.ndarray, eigenvalues_over_speed: np.ndarray, runs: dict[str, Result], path: Path
+    scene: BicycleScene,
+    speeds: np.ndarray,
+    eigenvalues_over_speed: np.ndarray,
+    runs_by_engine: dict[str, Result],
+    figure_path: Path,
 ) -> Path:
     """Save a figure of the eigenvalues over speed, and of lean and steer angle over time; returns its path."""
     drawn, axes = panels(4, 2, 2.4)
@@ -92,13 +96,13 @@ def figure(
     axes[0].set(ylabel="real part [1/s]", title="Eigenvalues: what grows is above 0", ylim=(-12.0, 7.0))
     axes[1].set(ylabel="imaginary part [1/s]", title="Weave: frequency", ylim=(0.0, None))
     for axis, name in ((axes[2], "lean"), (axes[3], "steer")):
-        for i, (engine, result) in enumerate(runs.items()):  # the later ones thinner: they lie on the first
+        for i, (engine, result) in enumerate(runs_by_engine.items()):  # the later ones thinner: they lie on the first
             width = max(2.6 - 1.5 * i, 0.6)
             axis.plot(result.times, np.degrees(result[name]), color=COLOURS[engine], label=LABELS[engine], lw=width)
         axis.set(xlabel="time [s]", ylabel=f"{name} [deg]", title=f"{name.capitalize()} angle")
     axes[2].legend()
-    add_heading(drawn, scene.title, runs)
-    return save(drawn, path)
+    add_heading(drawn, scene.title, runs_by_engine)
+    return save(drawn, figure_path)
 
 
 if __name__ == "__main__":

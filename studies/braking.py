@@ -88,13 +88,13 @@ def run(
 
 
 def rim_speed_differences(
-    measured_pressures: MeasuredPressures | None, stop: Stop, rim_speeds: np.ndarray
+    measured_pressures: MeasuredPressures | None, stop: Stop, computed_rim_speeds: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Rms differences (m/s) between the computed and the measured rim speed of each wheel; empty if none were measured.
-    rim_speeds (n, W) : computed, in m/s, of the W wheels."""
+    computed_rim_speeds (n, W) : computed, in m/s, of the W wheels."""
     if measured_pressures is None or measured_pressures.speeds is None:
         return {}
-    return {"rim less measured, rms [m/s]": measured_pressures.wheel_speed_error(stop.times, rim_speeds)}
+    return {"rim less measured, rms [m/s]": measured_pressures.wheel_speed_error(stop.times, computed_rim_speeds)}
 
 
 def measurement_end_line(measured_pressures: MeasuredPressures | None, stop: Stop) -> list[str]:
@@ -105,11 +105,11 @@ def measurement_end_line(measured_pressures: MeasuredPressures | None, stop: Sto
     return [f"    measured pressures end at {measured_pressures.times[-1]:.3f} s: from then on the last ones stay"]
 
 
-def comparison_lines(results: dict[str, Result]) -> list[str]:
+def comparison_lines(results_by_engine: dict[str, Result]) -> list[str]:
     """Lines for the screen, one per engine: position and yaw at which the vehicle stopped, stopping time, and computing
     time."""
     rows = []
-    for engine, result in results.items():
+    for engine, result in results_by_engine.items():
         path = result.detail
         x, y, yaw = path.states[-1, 0, :3]
         clock = f"; {path.clock}" if path.clock else ""
@@ -120,22 +120,29 @@ def comparison_lines(results: dict[str, Result]) -> list[str]:
     return rows
 
 
-def figures_lines(name: str, stop: Stop, figures: dict[str, float], wheels: dict[str, np.ndarray]) -> list[str]:
+def figures_lines(
+    procedure_name: str, stop: Stop, vehicle_figures: dict[str, float], wheel_figures: dict[str, np.ndarray]
+) -> list[str]:
     """Lines for the screen on one procedure: a table of figures for the vehicle, and a table with a column per
     wheel."""
     remaining_text = f"still {stop.speed[-1]:.2f} m/s; all figures are those until then"
     unfinished = "" if stop.path.ended_at_rest else f": not stopped by {stop.times[-1]:g} s, {remaining_text}"
-    rows = [f"  {name.replace('_', ' ')}{unfinished}"]
+    rows = [f"  {procedure_name.replace('_', ' ')}{unfinished}"]
     rows += [f"    {stop.path.clock}"] if stop.path.clock else []
     rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.vehicle_results().items()]
     rows += [
-        f"    {key:<40}{f'{value:.3f}' if np.isfinite(value) else 'not steady':>10}" for key, value in figures.items()
+        f"    {key:<40}{f'{value:.3f}' if np.isfinite(value) else 'not steady':>10}"
+        for key, value in vehicle_figures.items()
     ]
-    rows += [f"    ({NOT_CHECKED})"] if figures else []
-    rows += ["    (without steering correction, and of the vehicle without trailer)"] if "z_MALS" in figures else []
+    rows += [f"    ({NOT_CHECKED})"] if vehicle_figures else []
+    rows += (
+        ["    (without steering correction, and of the vehicle without trailer)"] if "z_MALS" in vehicle_figures else []
+    )
     names = wheel_names(stop.path.turning.shape[1])
     rows += ["    " + f"{'wheel':<40}" + "".join(f"{wheel.replace('trailer ', 'tr. '):>17}" for wheel in names)]
-    return rows + [f"    {key:<40}" + "".join(f"{value:>17.2f}" for value in values) for key, values in wheels.items()]
+    return rows + [
+        f"    {key:<40}" + "".join(f"{value:>17.2f}" for value in values) for key, values in wheel_figures.items()
+    ]
 
 
 if __name__ == "__main__":

@@ -115,42 +115,49 @@ def run(
     }
 
 
-def fitted_scene(scene: BrakingScene, options: Options, friction_scale: float, steer: float) -> BrakingScene:
+def fitted_scene(
+    scene: BrakingScene, study_options: Options, friction_scale: float, steer_angle: float
+) -> BrakingScene:
     """The scene with a friction factor of the surface and a steer angle (rad); raises RunFailed if the fit left their
     possible range."""
-    if not (0.05 < friction_scale < 2.0 and steer < 1.0):
+    if not (0.05 < friction_scale < 2.0 and steer_angle < 1.0):
         raise RunFailed(
-            "calibration", f"the fit diverges: friction times {friction_scale:.3g}, steer angle {steer:.3g} rad"
+            "calibration", f"the fit diverges: friction times {friction_scale:.3g}, steer angle {steer_angle:.3g} rad"
         )
-    procedure = scene.procedures[options.procedure].model_copy(update={"steer": steer})
-    tyres = scene.tyres.model_copy(update={"scale": {**scene.tyres.scale, options.surface: friction_scale}})
-    return scene.model_copy(update={"tyres": tyres, "procedures": {**scene.procedures, options.procedure: procedure}})
+    procedure = scene.procedures[study_options.procedure].model_copy(update={"steer": steer_angle})
+    tyres = scene.tyres.model_copy(update={"scale": {**scene.tyres.scale, study_options.surface: friction_scale}})
+    return scene.model_copy(
+        update={"tyres": tyres, "procedures": {**scene.procedures, study_options.procedure: procedure}}
+    )
 
 
 def _means_of_stops(
-    scene: BrakingScene, options: Options, runs: int, pool: Any, seed: int | None = None
+    scene: BrakingScene, study_options: Options, run_count: int, worker_pool: Any, seed: int | None = None
 ) -> dict[str, Scatter]:
     job = Stops(
         scene.table(),
         scene.file,
         scene.folder,
-        options.procedure,
-        options.speed_spread,
-        options.seed if seed is None else seed,
+        study_options.procedure,
+        study_options.speed_spread,
+        study_options.seed if seed is None else seed,
     )
-    stops = run_paths(job, runs, executor=pool, blocks=Blocks(STOPS_PER_BLOCK))
+    stops = run_paths(job, run_count, executor=worker_pool, blocks=Blocks(STOPS_PER_BLOCK))
     return {key: scatter_of(stops[key]) for key in PAPER_VALUES}
 
 
-def table(options: Options, friction_scale: float, steer: float, scatters: dict[str, Scatter]) -> list[str]:
+def table(
+    study_options: Options, friction_scale: float, steer_angle: float, scatter_by_figure: dict[str, Scatter]
+) -> list[str]:
     """Lines for the screen: the fitted parameters, and each figure beside the paper's values."""
     lines = [
-        f"  calibration: friction of {options.surface} times {friction_scale:.4f}, steer angle {steer:.5f} rad",
-        f"  means of {options.last} stops, +- the scatter of one",
+        f"  calibration: friction of {study_options.surface} times {friction_scale:.4f}, "
+        f"steer angle {steer_angle:.5f} rad",
+        f"  means of {study_options.last} stops, +- the scatter of one",
         f"    {'':<34}{'here':>18}   {'paper, simulated':<36}{'paper, measured':<18}",
     ]
     for key, (label, simulated, measured, kind_of_value) in PAPER_VALUES.items():
-        simulated_here = f"{scatters[key].mean:.3f} +- {scatters[key].deviation:.3f}"
+        simulated_here = f"{scatter_by_figure[key].mean:.3f} +- {scatter_by_figure[key].deviation:.3f}"
         lines.append(f"    {label:<34}{simulated_here:>18}   {simulated:<36}{measured:<18}{kind_of_value}")
     return lines
 

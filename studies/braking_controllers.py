@@ -73,18 +73,18 @@ def scene_of_each_run(scene: BrakingScene) -> dict[tuple[str, str, str], Braking
 
 
 def _single_procedure(
-    scene: BrakingScene, surface: str, right_surface: str, name: str, controller: ControllerTable
+    scene: BrakingScene, surface: str, right_surface: str, procedure_name: str, controller: ControllerTable
 ) -> BrakingScene:
     """The scene reduced to one procedure on one surface with one controller; right_surface : of the right track in
     split procedures."""
-    procedure = scene.procedures[name]
+    procedure = scene.procedures[procedure_name]
     if procedure.kind == "split":
         procedure = procedure.model_copy(update={"right": right_surface})
     return scene.model_copy(
         update={
             "road": RoadTable(stretches=[Stretch(left=surface)]),
             "controller": controller,
-            "procedures": {name: procedure},
+            "procedures": {procedure_name: procedure},
         }
     )
 
@@ -126,29 +126,31 @@ def run(
     return {"scene": scene.title, "folder": str(output_folder), "failed": failed, **summary}
 
 
-def table(stops: list[dict[str, Any]]) -> list[str]:
+def table(stop_rows: list[dict[str, Any]]) -> list[str]:
     """Lines for the screen: a table of the stops with a line per run."""
     heads = [*SHOWN_QUANTITIES, LOCKED_COLUMN]
     lines = [f"  {'surface':<10}{'procedure':<12}{'controller':<32}" + "".join(f"{head:>17}" for head in heads)]
-    for stop in stops:
+    for stop in stop_rows:
         labels = f"  {stop['surface']:<10}{stop['procedure'].replace('_', ' '):<12}{stop['controller']:<32}"
         lines.append(labels + "".join(f"{stop[head]:>17.2f}" for head in heads))
     return [*lines, "  locked: longest of the wheels, above 15 km/h"]
 
 
-def _save_stops(scene: BrakingScene, stops: list[dict[str, Any]], output_folder: Path, results: Results) -> None:
+def _save_stops(
+    scene: BrakingScene, stop_rows: list[dict[str, Any]], output_folder: Path, stop_results: Results
+) -> None:
     """Save the stops: a CSV line for each, and a netCDF result with an axis of stops, which also holds the assumptions
     that any stop broke."""
-    heads = [*SHOWN_QUANTITIES, LOCKED_COLUMN] if stops else []
-    texts = {name: Channel("stop", [stop[name] for stop in stops]) for name in LABEL_COLUMNS}
-    columns = {head: np.array([stop[head] for stop in stops]) for head in heads}
+    heads = [*SHOWN_QUANTITIES, LOCKED_COLUMN] if stop_rows else []
+    texts = {name: Channel("stop", [stop[name] for stop in stop_rows]) for name in LABEL_COLUMNS}
+    columns = {head: np.array([stop[head] for stop in stop_rows]) for head in heads}
     channels = {
         head.partition(" [")[0].replace("/", " by "): Channel("stop", column, head.partition(" [")[2][:-1])
         for head, column in columns.items()
     }
     stops_result = result(scene, channels, texts, engine="reference")
-    (joined_result(stops_result, results) if results else stops_result).save(output_folder / "controllers.nc")
-    rows = [(*(stop[name] for name in LABEL_COLUMNS), *(f"{stop[head]:.17g}" for head in heads)) for stop in stops]
+    (joined_result(stops_result, stop_results) if stop_results else stops_result).save(output_folder / "controllers.nc")
+    rows = [(*(stop[name] for name in LABEL_COLUMNS), *(f"{stop[head]:.17g}" for head in heads)) for stop in stop_rows]
     write_whole(
         output_folder / "controllers.csv", "".join(",".join(row) + "\n" for row in [(*LABEL_COLUMNS, *heads), *rows])
     )
@@ -157,13 +159,13 @@ def _save_stops(scene: BrakingScene, stops: list[dict[str, Any]], output_folder:
 PANEL_TITLES = {"v0^2/2d [m/s^2]": "equivalent deceleration [m/s²]", "yaw [deg]": "final yaw angle [deg]"}
 
 
-def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, results: Results) -> None:
+def _figure(scene: BrakingScene, stop_rows: list[dict[str, Any]], figure_path: Path, shown_results: Results) -> None:
     """Save a bar chart of the stops by procedure, with a column of panels per surface and a colour per controller."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, save, subplots
     from studies.braking_figures import plain_name
 
     options = read(Options, scene.options, scene.file, "options")
-    surfaces, _, kinds = (list(dict.fromkeys(stop[name] for stop in stops)) for name in LABEL_COLUMNS)
+    surfaces, _, kinds = (list(dict.fromkeys(stop[name] for stop in stop_rows)) for name in LABEL_COLUMNS)
     names, controllers_per_group = list(scene.procedures), len(options.controllers)
     figure, axes = subplots(
         len(PANEL_TITLES), max(len(surfaces), 1), figsize=(COLUMN_WIDTH, 6.0), squeeze=False, sharey="row"
@@ -175,7 +177,7 @@ def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, result
             for k, kind in enumerate(kinds):
                 bars = {
                     stop["procedure"]: stop[key]
-                    for stop in stops
+                    for stop in stop_rows
                     if (stop["surface"], stop["controller"]) == (surface, kind)
                 }
                 heights = [bars.get(name, np.nan) for name in names]
@@ -192,10 +194,10 @@ def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, result
                 title=f"{surface.capitalize()}; split: {options.surfaces[surface]} right" if row == 0 else "",
                 ylabel=quantity if column == 0 else "",
             )
-    if stops:
+    if stop_rows:
         legend_below(figure, axes[0, 0], columns=max(len(kinds) // controllers_per_group, 1))
-    add_heading(figure, scene.title, results)
-    save(figure, file)
+    add_heading(figure, scene.title, shown_results)
+    save(figure, figure_path)
 
 
 if __name__ == "__main__":

@@ -75,8 +75,11 @@ def run(
         for i, table in enumerate(tables):
             job = Stops(table, scene.file, scene.folder, options.procedure, options.speed_spread, options.seed + i)
 
-            def tell(finished: Done, i: int = i) -> None:
-                report_progress(f"{options.names[i]}: {finished}", (i + finished.done / finished.paths) / len(tables))
+            def tell(finished: Done, ensemble_number: int = i) -> None:
+                report_progress(
+                    f"{options.names[ensemble_number]}: {finished}",
+                    (ensemble_number + finished.done / finished.paths) / len(tables),
+                )
 
             store = output_folder / BLOCKS_FOLDER / options.names[i]
             ensembles.append(run_paths(job, options.runs, store, pool, blocks, tell))
@@ -107,22 +110,28 @@ def run(
     }
 
 
-def ensemble_lines(options: Options, scatters: list[dict[str, Scatter]], tests: dict[str, Welch]) -> list[str]:
+def ensemble_lines(
+    study_options: Options, scatters_of_ensembles: list[dict[str, Scatter]], welch_tests: dict[str, Welch]
+) -> list[str]:
     """Lines for the screen: means with standard errors, scatter, and Welch's test of the difference."""
     lines = [
-        f"  {options.runs} stops in each ensemble, initial speed scatters by {100 * options.speed_spread:g} %",
+        f"  {study_options.runs} stops in each ensemble, "
+        f"initial speed scatters by {100 * study_options.speed_spread:g} %",
         "    "
         + " " * 26
-        + "".join(f"{name + ': mean':>24}{'scatter':>10}" for name, _ in zip(options.names, scatters, strict=False)),
+        + "".join(
+            f"{name + ': mean':>24}{'scatter':>10}"
+            for name, _ in zip(study_options.names, scatters_of_ensembles, strict=False)
+        ),
     ]
     for key, label in KEPT_QUANTITIES.items():
         parts = "".join(
             f"{figures[key].mean:>14.3f} +- {figures[key].error:<6.3f}{figures[key].deviation:>10.3f}"
-            for figures in scatters
+            for figures in scatters_of_ensembles
         )
         lines.append(f"    {label:<26}{parts}")
-    for key in tests:
-        test = tests[key]
+    for key in welch_tests:
+        test = welch_tests[key]
         if np.isfinite(test.t) and test.half_width > 0.0:
             lines.append(
                 f"  difference of {KEPT_QUANTITIES[key]}: {test.difference:+.3f}, 95 % interval "
@@ -134,36 +143,36 @@ def ensemble_lines(options: Options, scatters: list[dict[str, Scatter]], tests: 
 
 def _figure(
     scene: BrakingScene,
-    options: Options,
+    study_options: Options,
     ensembles: list[dict[str, np.ndarray]],
-    scatters: list[dict[str, Scatter]],
-    tests: dict[str, Welch],
-    results: Results,
+    scatters_of_ensembles: list[dict[str, Scatter]],
+    welch_tests: dict[str, Welch],
+    shown_results: Results,
     output_folder: Path,
 ) -> None:
     from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, legend_below, save, subplots
 
     figure, (histogram, cloud) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
     edges = np.histogram_bin_edges(np.concatenate([arrays["distance"] for arrays in ensembles]), bins=24)
-    for i, (arrays, figures) in enumerate(zip(ensembles, scatters, strict=True)):
+    for i, (arrays, figures) in enumerate(zip(ensembles, scatters_of_ensembles, strict=True)):
         distance = figures["distance"]
-        label = f"{options.names[i]}: {distance.mean:.2f} m, scatter {distance.deviation:.2f} m"
+        label = f"{study_options.names[i]}: {distance.mean:.2f} m, scatter {distance.deviation:.2f} m"
         histogram.hist(arrays["distance"], edges, color=f"C{i}", alpha=0.5, label=label)
         histogram.axvline(distance.mean, color=f"C{i}")
         cloud.plot(arrays["speed"], arrays["distance"], "o", ms=3, color=f"C{i}", alpha=0.6)
     speeds = np.sort(ensembles[0]["speed"])
     cloud.plot(
         speeds,
-        scatters[0]["distance"].mean * (speeds / speeds.mean()) ** 2,
+        scatters_of_ensembles[0]["distance"].mean * (speeds / speeds.mean()) ** 2,
         color=DARK,
         lw=0.9,
         label="by the square of the speed alone",
     )
-    test_text = f"; Welch's test of the means: p = {tests['distance'].p_value:.2g}" if tests else ""
+    test_text = f"; Welch's test of the means: p = {welch_tests['distance'].p_value:.2g}" if welch_tests else ""
     histogram.set(xlabel="stopping distance [m]", ylabel="stops [-]", title="Stopping distances and their means")
     cloud.set(xlabel="initial speed [m/s]", ylabel="stopping distance [m]", title="More scatters than the speed")
     legend_below(figure, histogram, cloud, columns=2)
-    add_heading(figure, f"{scene.title}: {options.runs} stops each{test_text}", results)
+    add_heading(figure, f"{scene.title}: {study_options.runs} stops each{test_text}", shown_results)
     save(figure, output_folder / "ensemble.png")
 
 

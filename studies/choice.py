@@ -53,7 +53,7 @@ class SingleEffect:
 
 
 @dataclass(frozen=True)
-class SceneChoice:
+class SceneEffectChoice:
     """The choice of effects for a scene, and the changes by each single effect. further_tolerances : tolerance above
     which a staying effect would be left out, too; activity_of_element : energy activity (W) by element, if it has a
     closed form. results: runs of the reduced scene, with their errors."""
@@ -92,7 +92,7 @@ def save_choices(
     scenes: list[Any], engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
 ) -> dict[str, Any]:
     """Choose, save and draw the effects of scenes, the first in one of ``engines``; returns the summary."""
-    scene, choices = scenes[0], list[SceneChoice]()
+    scene, choices = scenes[0], list[SceneEffectChoice]()
     for i, chosen_scene in enumerate(scenes):
         report_progress(chosen_scene.title, i / len(scenes))
         linear, engines_asked = has_closed_form(chosen_scene), engines if chosen_scene is scene else ()
@@ -116,25 +116,27 @@ def save_choices(
     }
 
 
-def _results_by_name(choices: list[SceneChoice]) -> dict[str, Result]:
+def _results_by_name(scene_choices: list[SceneEffectChoice]) -> dict[str, Result]:
     """Results of the reduced scenes of all choices, by a name of the system (if there are several) and the run's
     number."""
     return {
         " ".join(
             (
-                *([choice.scene.system] if choices[1:] else []),
+                *([choice.scene.system] if scene_choices[1:] else []),
                 f"what is left{f', run {i + 1}' if choice.results[1:] else ''}",
             )
         ): run
-        for choice in choices
+        for choice in scene_choices
         for i, run in enumerate(choice.results)
     }
 
 
-def _pass_progress(report_progress: ReportProgress, title: str, completed: int, scene_count: int, share: float) -> None:
-    """Report progress over several scenes: ``completed`` scenes are done, and ``share`` of the search of the current
-    scene."""
-    report_progress(title, (completed + share) / scene_count)
+def _pass_progress(
+    report_progress: ReportProgress, scene_title: str, completed_scenes: int, scene_count: int, share: float
+) -> None:
+    """Report progress over several scenes: ``completed_scenes`` scenes are done, and ``share`` of the search of the
+    current scene."""
+    report_progress(scene_title, (completed_scenes + share) / scene_count)
 
 
 def has_closed_form(scene: Any) -> bool:
@@ -173,7 +175,7 @@ def search_text(scene: Any) -> str:
 
 def choice_of_scene(
     scene: Any, engines: tuple[str, ...], report_progress: Callable[[float], None] = lambda share: None
-) -> SceneChoice:
+) -> SceneEffectChoice:
     """The choice of effects for a scene by runs in one engine."""
     engine = engine_for_choice(scene, engines)
     with Crew.of(scene, default_workers=1).at_work(PAIRS_IN_ADVANCE, *folders_for_workers(scene)) as pool:
@@ -192,12 +194,12 @@ def choice_of_scene(
         )
         for effect in chooser.effects
     ]
-    return SceneChoice(
+    return SceneEffectChoice(
         scene, engine, choice, single_effects, chooser.change_if_left_out_too(frozenset(choice.left_out)), {}, results
     )
 
 
-def _linear_ride_choice(scene: Any) -> SceneChoice:
+def _linear_ride_choice(scene: Any) -> SceneEffectChoice:
     """The choice of effects for a linear stationary ride scene in closed form; numbers of calls are for one second of
     motion."""
     from models.advice.ride_choice.activity import activity_by_element
@@ -236,10 +238,10 @@ def _linear_ride_choice(scene: Any) -> SceneChoice:
         0,
         0.0,
     )
-    return SceneChoice(scene, "closed form", choice, single_effects, further, watts)
+    return SceneEffectChoice(scene, "closed form", choice, single_effects, further, watts)
 
 
-def _summary_of_choice(scene_choice: SceneChoice) -> dict[str, Any]:
+def _summary_of_choice(scene_choice: SceneEffectChoice) -> dict[str, Any]:
     """Entry of the summary for a choice: its effects, their changes and the saving."""
     choice = scene_choice.choice
     return {
@@ -266,18 +268,18 @@ def _summary_of_choice(scene_choice: SceneChoice) -> dict[str, Any]:
     }
 
 
-def _save_effect_table(choice: SceneChoice, path: Path) -> None:
+def _save_effect_table(scene_choice: SceneEffectChoice, table_path: Path) -> None:
     """Save a CSV file with a row per effect: the changes if only this effect is left out, the saved work, and whether
     it was left out."""
-    with path.open("x", newline="") as file:
+    with table_path.open("x", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        heads = [f"{name}, change [-]" for name in choice.scene.quantities]
+        heads = [f"{name}, change [-]" for name in scene_choice.scene.quantities]
         writer.writerow(["effect", "left out", *heads, "times less work alone [-]", "would break"])
-        for effect in choice.single_effects:
+        for effect in scene_choice.single_effects:
             values = map(repr, effect.changes.tolist())
-            broken = "; ".join(breach.says for breach in choice.choice.assumptions_barring.get(effect.effect, ()))
+            broken = "; ".join(breach.says for breach in scene_choice.choice.assumptions_barring.get(effect.effect, ()))
             writer.writerow(
-                [effect.effect, effect.effect in choice.choice.left_out, *values, repr(effect.work_ratio), broken]
+                [effect.effect, effect.effect in scene_choice.choice.left_out, *values, repr(effect.work_ratio), broken]
             )
 
 
@@ -291,7 +293,7 @@ def _change_text(relative_change: float, uncertainty: float) -> str:
     return percent_text(relative_change) + (f" +- {percent_text(uncertainty)}" if uncertainty else "")
 
 
-def _why_it_stays(relative_change: float, scene_choice: SceneChoice) -> str:
+def _why_it_stays(relative_change: float, scene_choice: SceneEffectChoice) -> str:
     """Text on why an effect stays: how much the quantities would change if it were left out, too."""
     if (
         relative_change > PREDICTION_SHARE * scene_choice.scene.tolerance
@@ -305,7 +307,7 @@ def _why_it_stays(relative_change: float, scene_choice: SceneChoice) -> str:
     )
 
 
-def choice_lines(scene_choice: SceneChoice, with_title: bool) -> list[str]:
+def choice_lines(scene_choice: SceneEffectChoice, with_title: bool) -> list[str]:
     """Lines for the screen on the choice of a scene's effects."""
     choice, scene = scene_choice.choice, scene_choice.scene
     rows = [
@@ -350,7 +352,7 @@ def choice_lines(scene_choice: SceneChoice, with_title: bool) -> list[str]:
     return [*rows, f"    the choice holds for tolerances down to {percent_text(worst)}"] if choice.left_out else rows
 
 
-def misleading_activities(scene_choice: SceneChoice) -> list[str]:
+def misleading_activities(scene_choice: SceneEffectChoice) -> list[str]:
     """Lines for the screen on inertias for which energy activity misleads: active ones without which a quantity hardly
     changes."""
     total, rows = sum(value for value in scene_choice.activity_of_element.values() if np.isfinite(value)), []
@@ -365,12 +367,12 @@ def misleading_activities(scene_choice: SceneChoice) -> list[str]:
     return rows
 
 
-def choice_figure(choices: list[SceneChoice], path: Path) -> None:
+def choice_figure(scene_choices: list[SceneEffectChoice], figure_path: Path) -> None:
     """Save a figure with a panel of changes per scene, and a panel of energy activities if there are any."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, save, subplots
 
-    shown = [(choice, False) for choice in choices] + [
-        (choice, True) for choice in choices if choice.activity_of_element
+    shown = [(choice, False) for choice in scene_choices] + [
+        (choice, True) for choice in scene_choices if choice.activity_of_element
     ]
     heights = [
         1.5 + 0.2 * (ELEMENTS_DRAWN if active else max(len(choice.single_effects), 4)) for choice, active in shown
@@ -381,11 +383,11 @@ def choice_figure(choices: list[SceneChoice], path: Path) -> None:
     for axis, (choice, active) in zip(axes.flat, shown, strict=True):
         _plot_activity(axis, choice) if active else _plot_changes(axis, choice)
     title = "Which effects matter for which question: change by leaving out one effect, against the tolerance"
-    add_heading(figure, title, _results_by_name(choices))
-    save(figure, path)
+    add_heading(figure, title, _results_by_name(scene_choices))
+    save(figure, figure_path)
 
 
-def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
+def _plot_changes(axis: Any, scene_choice: SceneEffectChoice) -> None:
     """Plot how much each quantity changes if a single effect is left out, for each effect.
 
     Shaded rows, from the scene's tolerance on, tell why an effect stays; a name says whether it went with the others.
@@ -436,7 +438,7 @@ def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
     axis.legend(fontsize=SMALL_TEXT, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def _effect_label(scene_choice: SceneChoice, effect: SingleEffect) -> str:
+def _effect_label(scene_choice: SceneEffectChoice, effect: SingleEffect) -> str:
     """Label of an effect with "(left out)" or "(stays)". An effect whose own change is small may stay, since it can
     matter together with others that were left out."""
     return effect.effect.replace("_", " ") + (
@@ -444,7 +446,7 @@ def _effect_label(scene_choice: SceneChoice, effect: SingleEffect) -> str:
     )
 
 
-def _plot_activity(axis: Any, scene_choice: SceneChoice) -> None:
+def _plot_activity(axis: Any, scene_choice: SceneEffectChoice) -> None:
     from models.drawing.figures import BLUE
 
     finite = {name: value for name, value in scene_choice.activity_of_element.items() if np.isfinite(value)}

@@ -65,10 +65,10 @@ def run(
     }
 
 
-def _table_lines(scene: ContactScene, forces: Result) -> list[str]:
+def _table_lines(scene: ContactScene, creep_forces: Result) -> list[str]:
     """Lines for the screen: the normal contact, then creep forces with errors, at all creepages or at some of a
     sweep."""
-    rolls: ContactResults = forces.detail
+    rolls: ContactResults = creep_forces.detail
     body, p = rolls.contact, rolls.contact.pressing
     limit = body.friction * p.load
     size = f"a = {1e3 * body.a:.3f} mm, b = {1e3 * body.b:.3f} mm, " if isinstance(body, OnEllipse) else ""
@@ -97,9 +97,11 @@ def _table_lines(scene: ContactScene, forces: Result) -> list[str]:
     return [*lines, loss + "; errors are of the force, that of Mz has both together" * bool(rolls.errors)]
 
 
-def _errors_text(error: Error, friction_limit: float) -> str:
-    cells, theory = (_percent_text(error_part, friction_limit) for error_part in (error.cells, error.theory))
-    return f"   {cells:>6}{theory:>8}{error.moment:>9.2g}"
+def _errors_text(force_error: Error, friction_limit_force: float) -> str:
+    cells, theory = (
+        _percent_text(error_part, friction_limit_force) for error_part in (force_error.cells, force_error.theory)
+    )
+    return f"   {cells:>6}{theory:>8}{force_error.moment:>9.2g}"
 
 
 THEORY_NAMES = {
@@ -110,13 +112,15 @@ THEORY_NAMES = {
 }
 
 
-def theory_text(method: Method) -> str:
+def theory_text(contact_theory: Method) -> str:
     """Name of a contact theory, with its number of cells along each axis if it has cells."""
-    return THEORY_NAMES[method.name] + ("" if method.name == "linear" else f", {method.cells} cells along each axis")
+    return THEORY_NAMES[contact_theory.name] + (
+        "" if contact_theory.name == "linear" else f", {contact_theory.cells} cells along each axis"
+    )
 
 
-def _percent_text(error: float, friction_limit: float) -> str:
-    return f"{100 * error / friction_limit:.2f}" if friction_limit > 0 else "0"
+def _percent_text(force_error: float, friction_limit_force: float) -> str:
+    return f"{100 * force_error / friction_limit_force:.2f}" if friction_limit_force > 0 else "0"
 
 
 def _contact_point_lines(scene: ContactScene) -> list[str]:
@@ -130,10 +134,10 @@ def _contact_point_lines(scene: ContactScene) -> list[str]:
     ]
 
 
-def _draw_figures(scene: ContactScene, forces: Result, output_folder: Path) -> None:
+def _draw_figures(scene: ContactScene, creep_forces: Result, output_folder: Path) -> None:
     from studies.contact_figures import contact_figure, sweep_figure
 
-    rolls: ContactResults = forces.detail
+    rolls: ContactResults = creep_forces.detail
     motion, last_rolled, sweep = rolls.motions[-1], rolls.rolled[-1], scene.sweep
     if last_rolled.fields:
         title = (
@@ -148,7 +152,7 @@ def _draw_figures(scene: ContactScene, forces: Result, output_folder: Path) -> N
             friction,
             title,
             _pressure_name(rolls.contact),
-            forces,
+            creep_forces,
             output_folder / "contact.png",
         )
     if sweep is not None:
@@ -158,16 +162,16 @@ def _draw_figures(scene: ContactScene, forces: Result, output_folder: Path) -> N
             if value and name != sweep.of
         )
         title = f"{scene.title}\nForces by {theory_text(scene.method)}{note_on_others}"
-        sweep_figure(sweep, forces, _exact_checks(scene, rolls), title, output_folder / "forces.png")
+        sweep_figure(sweep, creep_forces, _exact_checks(scene, rolls), title, output_folder / "forces.png")
 
 
 CREEPAGE_SYMBOLS = (("ξx", ""), ("ξy", ""), ("spin", " 1/m"))
 
 
-def _pressure_name(body: RollingContact) -> str:
+def _pressure_name(rolling_contact: RollingContact) -> str:
     """Name of the pressure distribution over a contact's cells, for a figure's title."""
-    if isinstance(body, Fastsim) and body.choices["bound"] != "elliptic":
-        return f"FASTSIM's pressure ({body.choices['bound']} bound)"
+    if isinstance(rolling_contact, Fastsim) and rolling_contact.choices["bound"] != "elliptic":
+        return f"FASTSIM's pressure ({rolling_contact.choices['bound']} bound)"
     return "pressure"
 
 

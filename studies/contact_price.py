@@ -68,7 +68,7 @@ def run(
     }
 
 
-def _table_lines(points: list[TheoryPoint], contact_count: int, reference_uncertainty: float) -> list[str]:
+def _table_lines(theory_points: list[TheoryPoint], contact_count: int, reference_uncertainty: float) -> list[str]:
     """Lines for the screen: errors and times of all theories and cells, then the cheapest theory for each target
     error."""
     return [
@@ -78,10 +78,13 @@ def _table_lines(points: list[TheoryPoint], contact_count: int, reference_uncert
         *(
             f"    {point.name:<28}{point.cells:>6}{100 * point.mean:>8.2f}{100 * point.quantile_95:>11.2f}"
             f"{100 * max(point.errors):>9.2f}   {cost((point.seconds, *point.range))}"
-            for point in points
+            for point in theory_points
         ),
         "  cheapest that meets      in the mean; in 95 of 100 contacts",
-        *(f"    {target:>6}  {mean};  {largest_cheapest}" for target, mean, largest_cheapest in cheapest_lines(points)),
+        *(
+            f"    {target:>6}  {mean};  {largest_cheapest}"
+            for target, mean, largest_cheapest in cheapest_lines(theory_points)
+        ),
     ]
 
 

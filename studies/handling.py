@@ -53,8 +53,8 @@ def run(
     }
 
 
-def _figures_of_runs(runs: dict[str, Result]) -> dict[str, float]:
-    first, *other_runs = runs.values()
+def _figures_of_runs(runs_by_engine: dict[str, Result]) -> dict[str, float]:
+    first, *other_runs = runs_by_engine.values()
     drive = first.detail
     figures = {
         "largest yaw rate [rad/s]": np.abs(drive.velocity()[:, 2]).max(),
@@ -71,10 +71,10 @@ def _figures_of_runs(runs: dict[str, Result]) -> dict[str, float]:
     return {key: float(value) for key, value in figures.items()}
 
 
-def _manoeuvre_line(name: str, figures: dict[str, float]) -> str:
-    yaw, lateral, load, used = list(figures.values())[:4]
-    gap = f"{figures[DIFFERENCE_TITLE]:>10.1e}" if DIFFERENCE_TITLE in figures else ""
-    return f"    {name:<16}{yaw:>6.3f} rad/s{lateral:>8.2f} m/s^2{load:>10.0f} N{100 * used:>8.0f} %{gap}"
+def _manoeuvre_line(manoeuvre_name: str, run_figures: dict[str, float]) -> str:
+    yaw, lateral, load, used = list(run_figures.values())[:4]
+    gap = f"{run_figures[DIFFERENCE_TITLE]:>10.1e}" if DIFFERENCE_TITLE in run_figures else ""
+    return f"    {manoeuvre_name:<16}{yaw:>6.3f} rad/s{lateral:>8.2f} m/s^2{load:>10.0f} N{100 * used:>8.0f} %{gap}"
 
 
 if __name__ == "__main__":

@@ -81,20 +81,20 @@ def run(
     }
 
 
-def _numbers_of_orbit(orbit: Orbit, *names: str) -> dict[str, float]:
+def _numbers_of_orbit(orbit: Orbit, *quantity_names: str) -> dict[str, float]:
     """Named quantities of a limit cycle as plain numbers in SI units."""
-    return {name: float(getattr(orbit, name)) for name in names}
+    return {name: float(getattr(orbit, name)) for name in quantity_names}
 
 
-def _branch_lines(orbits: list[Orbit]) -> list[str]:
+def _branch_lines(limit_cycles: list[Orbit]) -> list[str]:
     """Lines for the screen, one for each limit cycle of the branch."""
-    if not orbits:
+    if not limit_cycles:
         return []
     lines = [
         "  cycles, by rising amplitude; the error is what halving the step changes",
         "    amplitude       speed    error   frequency    error  multiplier",
     ]
-    for o in orbits:
+    for o in limit_cycles:
         kind = "attracts" if o.stable else "repels"
         lines.append(
             f"    {1e3 * o.amplitude:>6.3f} mm{o.speed:>8.3f} m/s{o.error:>9.0e}{o.frequency:>9.4f} Hz"
@@ -103,11 +103,11 @@ def _branch_lines(orbits: list[Orbit]) -> list[str]:
     return lines
 
 
-def _cycle_lines(cycles: dict[str, Orbit]) -> list[str]:
+def _cycle_lines(cycles_by_engine: dict[str, Orbit]) -> list[str]:
     """Lines for the screen on amplitude, frequency, forces and power of the limit cycle in every engine."""
-    if not cycles:
+    if not cycles_by_engine:
         return []
-    first = next(iter(cycles.values()))
+    first = next(iter(cycles_by_engine.values()))
     path = first.path()
     power, creep = path.contacts["power"], np.hypot(path.contacts["fx"], path.contacts["fy"])
     yaw = 1e3 * path.states[:, YAW].max()
@@ -116,7 +116,7 @@ def _cycle_lines(cycles: dict[str, Orbit]) -> list[str]:
         f"{creep.max():,.0f} N, their power from {power.min():,.4g} to {power.max():.3g} W at a patch, "
         f"{-np.trapezoid(power.sum(axis=1), path.times):.4g} J in a period"
     ]
-    for engine, o in cycles.items():
+    for engine, o in cycles_by_engine.items():
         lines.append(
             f"    {engine:<10}{1e3 * o.amplitude:>12.8f} mm, error {1e3 * o.error:.0e}"
             f"{o.frequency:>14.9f} Hz, error {o.frequency_error:.0e}"

@@ -63,7 +63,7 @@ class Options(Strict):
 
 
 @dataclass
-class Source:
+class ReadingsSource:
     """Accelerometer readings (n, sensors, 3) in m/s^2 of an engine's run or a file, ``period`` (s) apart, with the true
     motion and gyro readings if there are any."""
 
@@ -89,7 +89,7 @@ def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_prog
     options, p = check(scene, engines)
     array = _sensor_array(scene, p.positions())
     failed: dict[str, str] = {}
-    sources: list[Source] = []
+    sources: list[ReadingsSource] = []
     results: dict[str, Result] = {}
     for i, name in enumerate(engines if options.file is None else (options.file,)):
         report_progress(f"{name}: readings and motion", i / len(engines))
@@ -156,18 +156,20 @@ def _sensor_array(scene: Scene, positions: dict[str, tuple[float, float, float]]
         raise InputError(scene.file, SENSORS_KEY, error.value, error.allowed) from None
 
 
-def _measured_readings(scene: Scene, options: Options, parameters: Parameters) -> Source:
+def _measured_readings(scene: Scene, study_options: Options, parameters: Parameters) -> ReadingsSource:
     """Readings of the user's file, in the order of the scene's accelerometers."""
-    assert options.file is not None
-    return _readings_of_file(options.file, scene.path(options.file, "options.file"), parameters)
+    assert study_options.file is not None
+    return _readings_of_file(study_options.file, scene.path(study_options.file, "options.file"), parameters)
 
 
-def _readings_of_file(name: str, path: Path, parameters: Parameters) -> Source:
-    values, period = read_time_series(path, dict.fromkeys(chain(*channels_of_sensors(parameters)), ACCELERATIONS))
-    return Source(name, values.reshape(len(values), -1, 3), period)
+def _readings_of_file(source_name: str, readings_path: Path, parameters: Parameters) -> ReadingsSource:
+    values, period = read_time_series(
+        readings_path, dict.fromkeys(chain(*channels_of_sensors(parameters)), ACCELERATIONS)
+    )
+    return ReadingsSource(source_name, values.reshape(len(values), -1, 3), period)
 
 
-def _readings_of_run(scene: Scene, engine: str, output_folder: Path) -> Source:
+def _readings_of_run(scene: Scene, engine: str, output_folder: Path) -> ReadingsSource:
     """Readings of an engine's run, which are written to a file and read again like measured readings."""
     p = scene.effects["accelerometers"]
     computed = simulate(scene, engine, error=scene.error)
@@ -182,49 +184,57 @@ def _readings_of_run(scene: Scene, engine: str, output_folder: Path) -> Source:
     return source
 
 
-def _recover_motions(readings_source: Source, array: SensorArray, options: Options, parameters: Parameters) -> None:
+def _recover_motions(
+    readings_source: ReadingsSource, accelerometers: SensorArray, study_options: Options, parameters: Parameters
+) -> None:
     """Recover the motion from the readings by every method, and store it in the source. A suspect sensor, whose
     readings do not fit a rigid body, is used by the first method only."""
-    readings_source.quality = fit_quality(array, readings_source.readings, parameters.deviation)
+    readings_source.quality = fit_quality(accelerometers, readings_source.readings, parameters.deviation)
     suspect, readings = readings_source.quality.suspect, readings_source.readings
     recover = partial(
         recovered_motion,
         sample_period=readings_source.period,
         start_state=readings_source.start,
-        gravity_corrected=options.zeroed,
+        gravity_corrected=study_options.zeroed,
     )
     if suspect:
-        readings_source.recovered_motions["all sensors, integrated"] = recover(array, readings)
-        readings = readings[:, [name != suspect for name in array.names]]
-        array = sensor_array(
+        readings_source.recovered_motions["all sensors, integrated"] = recover(accelerometers, readings)
+        readings = readings[:, [name != suspect for name in accelerometers.names]]
+        accelerometers = sensor_array(
             {name: sensor_position for name, sensor_position in parameters.positions().items() if name != suspect}
         )
-    readings_source.recovered_motions["integrated"] = recover(array, readings)
+    readings_source.recovered_motions["integrated"] = recover(accelerometers, readings)
     if parameters.deviation > 0:
         filtered_rates, _ = filter_rates(
-            spin_from_readings(array, readings),
+            spin_from_readings(accelerometers, readings),
             readings_source.period,
             np.array(readings_source.start.rates),
             parameters.deviation,
         )
-        readings_source.recovered_motions["rates held by w w^T"] = recover(array, readings, rates=filtered_rates)
+        readings_source.recovered_motions["rates held by w w^T"] = recover(
+            accelerometers, readings, rates=filtered_rates
+        )
     if readings_source.gyro is not None:
         turning = readings_source.gyro[:, None] * [
             0.0,
             1.0,
             0.0,
         ]  # it reads the pitch rate; the vehicle does nothing else
-        readings_source.recovered_motions["rates from the gyro"] = recover(array, readings, rates=turning)
-    cut_offs = CutOffs(options.turning_cut_off, options.position_cut_off)
-    readings_source.recovered_motions["high-passed"] = recover(array, readings, cut_offs=cut_offs)
+        readings_source.recovered_motions["rates from the gyro"] = recover(accelerometers, readings, rates=turning)
+    cut_offs = CutOffs(study_options.turning_cut_off, study_options.position_cut_off)
+    readings_source.recovered_motions["high-passed"] = recover(accelerometers, readings, cut_offs=cut_offs)
 
 
-def _compared_values(motion: RecoveredMotion) -> dict[str, np.ndarray]:
+def _compared_values(recovered_motion: RecoveredMotion) -> dict[str, np.ndarray]:
     """Pitch (rad), pitch rate (rad/s) and heave (m, down) of a recovered motion."""
-    return {"pitch": motion.angles()[:, 1], "rate": motion.rates[:, 1], "heave": motion.position[:, 2]}
+    return {
+        "pitch": recovered_motion.angles()[:, 1],
+        "rate": recovered_motion.rates[:, 1],
+        "heave": recovered_motion.position[:, 2],
+    }
 
 
-def _save_motions(scene: Scene, readings_source: Source, output_folder: Path, options: Options) -> Result:
+def _save_motions(scene: Scene, readings_source: ReadingsSource, output_folder: Path, study_options: Options) -> Result:
     """Save the recovered pitch, pitch rate and heave: a CSV file per method, and a netCDF result with all methods,
     which is returned."""
     stem, values_of_methods = (
@@ -246,7 +256,7 @@ def _save_motions(scene: Scene, readings_source: Source, output_folder: Path, op
         readings_source.quality,
         readings_source.readings,
         readings_source.period,
-        not readings_source.truth and not options.zeroed,
+        not readings_source.truth and not study_options.zeroed,
     )
     with_assumptions(saved, assumptions(record, readings_source.recovered_motions["integrated"]))
     if scene.error:
@@ -254,11 +264,11 @@ def _save_motions(scene: Scene, readings_source: Source, output_folder: Path, op
             "the table has the error of each way beside the run" if readings_source.truth else "no truth is known"
         )
         not_estimated(saved, f"noise and mounts err most, and {truth_text}")
-    saved.save(output_folder / f"{stem} moved_values.nc")
+    saved.save(output_folder / f"{stem} motion.nc")
     return saved
 
 
-def _summary_of_methods(readings_source: Source) -> dict[str, Any]:
+def _summary_of_methods(readings_source: ReadingsSource) -> dict[str, Any]:
     """Summary of the recovered motions: share of misfit in the readings, suspect sensor, and largest and rms error of
     each method; without a true motion, largest and rms value in place of errors."""
     assert readings_source.quality is not None
@@ -274,7 +284,7 @@ def _summary_of_methods(readings_source: Source) -> dict[str, Any]:
     return {"source": readings_source.name, **quality_facts, "ways": errors_of_methods}
 
 
-def _screen_lines(readings_source: Source, parameters: Parameters) -> list[str]:
+def _screen_lines(readings_source: ReadingsSource, parameters: Parameters) -> list[str]:
     """Lines for the screen: verdict on the readings, then largest and rms error (or value) for each method."""
     assert readings_source.quality is not None
     numbers, kind = _summary_of_methods(readings_source), "error" if readings_source.truth else "size"
@@ -295,19 +305,19 @@ def _screen_lines(readings_source: Source, parameters: Parameters) -> list[str]:
     return lines
 
 
-def _rigidity_text(quality: Quality) -> str:
+def _rigidity_text(readings_quality: Quality) -> str:
     """Sentence on the consistency of the readings with rigid-body motion."""
-    if quality.rigid is None:
+    if readings_quality.rigid is None:
         return "whether the body is rigid cannot be told: no sensor is left over"
-    share = f"{100 * quality.share:.2g} % of the relative accelerations fit no rigid body"
-    if quality.rigid:
+    share = f"{100 * readings_quality.share:.2g} % of the relative accelerations fit no rigid body"
+    if readings_quality.rigid:
         return (
             f"{share} (allowed: {100 * UNEXPLAINED_SHARE_LIMIT:g} %, or what the noise leaves): the mounts "
             "pass for rigid"
         )
-    if quality.suspect:
+    if readings_quality.suspect:
         return (
-            f"{share} (allowed: {100 * UNEXPLAINED_SHARE_LIMIT:g} %): {quality.suspect!r} does not move "
+            f"{share} (allowed: {100 * UNEXPLAINED_SHARE_LIMIT:g} %): {readings_quality.suspect!r} does not move "
             "with the body and is left out"
         )
     return (
@@ -317,13 +327,13 @@ def _rigidity_text(quality: Quality) -> str:
     )
 
 
-def _closing_lines(options: Options) -> list[str]:
+def _closing_lines(study_options: Options) -> list[str]:
     """Lines for the screen on the cut-off frequencies of the filters, and on the false displacement that a tilt
     causes."""
     far = float(tilt_displacement(TABLE_TILT, np.array([10.0]))[0])
     return [
-        f"  High-pass: rates and angles {options.turning_cut_off:g} Hz, velocity and position "
-        f"{options.position_cut_off:g} Hz, Butterworth of order 2 forwards and backwards;",
+        f"  High-pass: rates and angles {study_options.turning_cut_off:g} Hz, velocity and position "
+        f"{study_options.position_cut_off:g} Hz, Butterworth of order 2 forwards and backwards;",
         "  it takes slow errors and true grades alike, and is least sure within one period of the ends.",
         f"  A tilt error of {1e3 * TABLE_TILT:g} mrad turns gravity into a false displacement of "
         f"{far:.2g} m after 10 s, "
@@ -331,7 +341,7 @@ def _closing_lines(options: Options) -> list[str]:
     ]
 
 
-def _figure(readings_source: Source, results: Results, path: Path) -> None:
+def _figure(readings_source: ReadingsSource, shown_results: Results, figure_path: Path) -> None:
     """Save a figure of pitch and heave for one source of readings, the error of each method if the true motion is
     known, and the misfit of the readings from rigid-body motion."""
     from models.drawing.figures import COLUMN_WIDTH, GREY, add_heading, legend_below, save, subplot_mosaic
@@ -375,8 +385,10 @@ def _figure(readings_source: Source, results: Results, path: Path) -> None:
     )
     axes["misfit"].set_xlabel("time [s]")
     legend_below(figure, axes["pitch error" if readings_source.truth else "pitch"], columns=3)
-    add_heading(figure, f"Pitch and heave from accelerometers, {readings_source.name}: what each way errs by", results)
-    save(figure, path)
+    add_heading(
+        figure, f"Pitch and heave from accelerometers, {readings_source.name}: what each way errs by", shown_results
+    )
+    save(figure, figure_path)
 
 
 def _plot_motions(
@@ -384,14 +396,16 @@ def _plot_motions(
     times: np.ndarray,
     values_of_methods: dict[str, np.ndarray],
     title: str,
-    readings_source: Source,
-    name: str,
+    readings_source: ReadingsSource,
+    quantity_name: str,
 ) -> None:
     """Plot the true motion over time if it is known, else the motion recovered by each method."""
     from models.drawing.figures import TRUTH_COLOUR
 
     if readings_source.truth:
-        axis.plot(times, (1e3 if name == "pitch" else 1.0) * readings_source.truth[name], color=TRUTH_COLOUR)
+        axis.plot(
+            times, (1e3 if quantity_name == "pitch" else 1.0) * readings_source.truth[quantity_name], color=TRUTH_COLOUR
+        )
         axis.set_title(f"True {title[0].lower()}{title[1:]}")
         return
     for method_name, values in values_of_methods.items():
@@ -399,9 +413,9 @@ def _plot_motions(
     axis.set_title(title)
 
 
-def _plot_errors(axis: Any, times: np.ndarray, errors: dict[str, np.ndarray], title: str) -> None:
+def _plot_errors(axis: Any, times: np.ndarray, errors_of_methods: dict[str, np.ndarray], title: str) -> None:
     """Plot the largest error of each method up to each time, on a logarithmic scale."""
-    for method_name, error in errors.items():
+    for method_name, error in errors_of_methods.items():
         axis.semilogy(times[1:], np.maximum.accumulate(error)[1:], label=method_name)
     axis.set_title(title)
 

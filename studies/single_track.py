@@ -55,7 +55,7 @@ def measured_channels(scene: SingleTrackScene, computed_drive: Result) -> dict[s
     return {name: np.interp(computed_drive.times, *time_and_values) for name, time_and_values in curves.items()}
 
 
-def figure(computed_drive: Result, measured_values: Mapping[str, np.ndarray], title: str, path: Path) -> Path:
+def figure(computed_drive: Result, measured_values: Mapping[str, np.ndarray], title: str, figure_path: Path) -> Path:
     """Save a figure of the steer angle and three channels over time, of each axle's slip angle over time, and of its
     ratio of side force to load over slip angle.
 
@@ -81,7 +81,7 @@ def figure(computed_drive: Result, measured_values: Mapping[str, np.ndarray], ti
     axes[4].legend(markerscale=3.0)
     legend_below(drawing, *axes[:4])
     add_heading(drawing, title, {"drive": computed_drive})
-    return save(drawing, path)
+    return save(drawing, figure_path)
 
 
 if __name__ == "__main__":

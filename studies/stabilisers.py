@@ -57,28 +57,28 @@ def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_prog
     }
 
 
-def _step_error_text(results: Results) -> str:
+def _step_error_text(score_results: Results) -> str:
     """JSON text of the step error of the score, which is that of the measurement, because all runs use its steps."""
-    error = json.loads(next(iter(results.values())).data.attrs["error"])
+    error = json.loads(next(iter(score_results.values())).data.attrs["error"])
     return json.dumps(
         error | {"how": f"{error['how']}, of the measurement, whose steps all runs share"} if error else {}
     )
 
 
-def summary_lines(rows: list[Row], benches_of_roads: list[Bench], options: Options) -> list[str]:
+def summary_lines(score_rows: list[Row], benches_of_roads: list[Bench], study_options: Options) -> list[str]:
     """Lines for the screen: a table of all methods, with a block for each engine and road."""
     lines = [
-        f"  Damage ratios: {COUNTING_CONVENTION}, exponent {options.slope:g}. Accepted: all four "
+        f"  Damage ratios: {COUNTING_CONVENTION}, exponent {study_options.slope:g}. Accepted: all four "
         "body-frame ratios within "
-        f"{options.limits.damage_error:.0%},",
-        f"  pitch within {options.limits.pitch_error:g} rad, artificial moment up to 15 Hz at most "
-        f"{options.limits.artificial_share:.0%} of I pitch''. The vertical f3 is never judged: it is blind.",
+        f"{study_options.limits.damage_error:.0%},",
+        f"  pitch within {study_options.limits.pitch_error:g} rad, artificial moment up to 15 Hz at most "
+        f"{study_options.limits.artificial_share:.0%} of I pitch''. The vertical f3 is never judged: it is blind.",
         "  * seconds by those of the free run, each run once",
     ]
-    for engine, road in dict.fromkeys((row["engine"], row["road"]) for row in rows):
-        of_engine = [row for row in rows if (row["engine"], row["road"]) == (engine, road)]
+    for engine, road in dict.fromkeys((row["engine"], row["road"]) for row in score_rows):
+        of_engine = [row for row in score_rows if (row["engine"], row["road"]) == (engine, road)]
         bench = next(bench for bench in benches_of_roads if bench.road == road)
-        road_text = "the road" if road == "road" else f"a grade of {options.grade:g} rad"
+        road_text = "the road" if road == "road" else f"a grade of {study_options.grade:g} rad"
         free = next(row["seconds"] for row in of_engine if row["method"] == "free")
         lines += [
             "",
@@ -100,13 +100,14 @@ UNITS_LINE = (
 )
 
 
-def _score_line(row: Row, free_seconds: float) -> str:
-    ratios = "".join(f"{_ratio_text(row[f'damage {channel}']):>7}" for channel in SECTION_FORCE_CHANNELS)
+def _score_line(score: Row, free_seconds: float) -> str:
+    ratios = "".join(f"{_ratio_text(score[f'damage {channel}']):>7}" for channel in SECTION_FORCE_CHANNELS)
     return (
-        f"  {row['method']:<25}{ratios}{_ratio_text(row['vertical damage f3']):>9}{row['pitch error max [rad]']:>9.4f}"
-        f"{row['pitch error rms [rad]']:>7.4f}{row['moment rms [N m]']:>7.0f}{row['moment max [N m]']:>8.0f}"
-        f"{row['moment share to 15 Hz']:>6.0%}{row['seconds'] / free_seconds:>8.1f}{row['verdict']:>11}"
-        f"{row['without truth']:>11}"
+        f"  {score['method']:<25}{ratios}{_ratio_text(score['vertical damage f3']):>9}"
+        f"{score['pitch error max [rad]']:>9.4f}{score['pitch error rms [rad]']:>7.4f}"
+        f"{score['moment rms [N m]']:>7.0f}{score['moment max [N m]']:>8.0f}"
+        f"{score['moment share to 15 Hz']:>6.0%}{score['seconds'] / free_seconds:>8.1f}{score['verdict']:>11}"
+        f"{score['without truth']:>11}"
     )
 
 

@@ -24,7 +24,7 @@ from models.systems.wheelset.scene import WheelsetScene
 
 SYSTEM = "wheelset"
 ReportProgress = Callable[[str, float], None]
-Paths = dict[str, dict[float, Result]]
+RunsByEngineAndSpeed = dict[str, dict[float, Result]]
 """Result of each run, by engine and speed (m/s)."""
 
 
@@ -35,7 +35,12 @@ def run(
     ``over_speed.csv`` and figures, and returns the summary."""
     from studies.wheelset_figures import creep_figure, paths_figure, stability_figure
 
-    wheelset, failed, eigenvalues, paths = wheelset_of(scene), dict[str, str](), dict[str, Result](), Paths()
+    wheelset, failed, eigenvalues, paths = (
+        wheelset_of(scene),
+        dict[str, str](),
+        dict[str, Result](),
+        RunsByEngineAndSpeed(),
+    )
     conicities = conicity.run(scene) if conicity.reports_conicity(scene) else None
     for i, engine in enumerate(engines):
         try:
@@ -76,11 +81,11 @@ def run(
     }
 
 
-def _results_by_name(paths: Paths) -> dict[str, Result]:
+def _results_by_name(wheelset_runs: RunsByEngineAndSpeed) -> dict[str, Result]:
     """Results of all runs, by a name of engine and speed."""
     return {
         f"{engine}, {speed_text}": path
-        for engine, paths_of_engine in paths.items()
+        for engine, paths_of_engine in wheelset_runs.items()
         for speed_text, path in results_by_speed_text(paths_of_engine).items()
     }
 
@@ -95,7 +100,9 @@ def _save_table(linear_results: dict[str, LinearisedMotion], output_folder: Path
     write_table(output_folder / "over_speed.csv", columns)
 
 
-def _summary_of_paths(wheelset: Wheelset, linear_results: dict[str, LinearisedMotion], paths: Paths) -> dict[str, Any]:
+def _summary_of_paths(
+    wheelset: Wheelset, linear_results: dict[str, LinearisedMotion], wheelset_runs: RunsByEngineAndSpeed
+) -> dict[str, Any]:
     """Summary in SI units: wavelengths, critical speed by engine (None if there is none), and largest power of the
     creep forces."""
     return {
@@ -104,7 +111,7 @@ def _summary_of_paths(wheelset: Wheelset, linear_results: dict[str, LinearisedMo
         "critical_speed": {engine: linear_run.critical_speed for engine, linear_run in linear_results.items()},
         "largest_power": {
             engine: max(float(path["power"].max()) for path in paths_of_engine.values())
-            for engine, paths_of_engine in paths.items()
+            for engine, paths_of_engine in wheelset_runs.items()
         },
     }
 
@@ -145,19 +152,21 @@ def _stability_lines(wheelset: Wheelset, linear_results: dict[str, LinearisedMot
     ]
 
 
-def _critical_speed_text(critical_speed: float | None, reason: str, first_critical_speed: float | None = None) -> str:
+def _critical_speed_text(
+    critical_speed: float | None, missing_reason: str, first_critical_speed: float | None = None
+) -> str:
     if critical_speed is None:
-        return f"none: the wheelset {reason}"
+        return f"none: the wheelset {missing_reason}"
     return f"{critical_speed:>14.9g} m/s" + (
         f" {critical_speed / first_critical_speed - 1:+.0e} from the first" if first_critical_speed else ""
     )
 
 
-def _path_lines(scene: WheelsetScene, paths: Paths) -> list[str]:
+def _path_lines(scene: WheelsetScene, wheelset_runs: RunsByEngineAndSpeed) -> list[str]:
     """Lines for the screen on the end of each run, the differences between the engines, and the energy balance."""
-    if not paths:
+    if not wheelset_runs:
         return []
-    (name, first), *other_paths = paths.items()
+    (name, first), *other_paths = wheelset_runs.items()
     lines = [f"  paths, by {name}, with {scene.contact.law}"]
     for speed, path in first.items():
         motion, power = path.detail, path["power"]
@@ -177,12 +186,12 @@ def _path_lines(scene: WheelsetScene, paths: Paths) -> list[str]:
     return lines
 
 
-def _ending_text(motion: Motion) -> str:
+def _ending_text(wheelset_motion: Motion) -> str:
     """Text on a run's last lateral amplitude, and its change in the last cycle."""
-    y = motion.states[:, Y]
+    y = wheelset_motion.states[:, Y]
     tops = y[positive_maxima(y)]
     if tops.size < 2:
-        return f"ends at {1e3 * motion.states[-1, Y]:.3g} mm without a second maximum"
+        return f"ends at {1e3 * wheelset_motion.states[-1, Y]:.3g} mm without a second maximum"
     return f"last amplitude {1e3 * tops[-1]:.4g} mm, {100 * (tops[-1] / tops[-2] - 1):+.3g} % in the last cycle"
 
 

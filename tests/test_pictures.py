@@ -16,7 +16,7 @@ from studies.pictures import video
 from studies.pictures.camera import Camera, painted_picture
 from studies.pictures.drawing import arrow_lines, drawn_pose
 from studies.pictures.film import largest_differences
-from studies.pictures.page import Page
+from studies.pictures.page import FilmPage
 from studies.pictures.shapes import arrow, box
 
 TIMES = np.array([0.0, 0.02, 0.05])
@@ -98,7 +98,7 @@ def test_a_film_has_as_many_frames_as_its_duration_and_rate_say(hunting, tmp_pat
         pytest.skip(video.missing_extra("mp4"))
     import imageio_ffmpeg
 
-    frames = list(Page(*hunting).frames())
+    frames = list(FilmPage(*hunting).frames())
     assert frames[0].shape == (720, 1280, 3) and (frames[0] != frames[2]).any()
     for kind in hunting[
         0

@@ -158,10 +158,10 @@ def compare(first: "Result | str | Path", second: "Result | str | Path", shift: 
     """Lay two results of the same kind beside each other, or a measurement over a result.
 
     Each is a result or the file of a saved result; ``second`` may be the file of a measurement, whose channels have the
-    names of the run's with units in brackets, as ``f1 [kN]``. The detail of two results is a list of ``Difference``,
-    those that differ most first: ``second`` less ``first``, with the place where it is largest and whether it lies
-    within the errors that both state. That of a measurement is an ``Overlay``: the time shift, and the error of every
-    channel.
+    names of the run's with units in brackets, as ``f1 [kN]``. The detail of two results is a list of
+    ``QuantityDifference``, those that differ most first: ``second`` less ``first``, with the place where it is largest
+    and whether it lies within the errors that both state. That of a measurement is a ``MeasurementOverlay``: the time
+    shift, and the error of every channel.
 
     shift : s, what the measurement's clock shows at the run's time 0; sought where None. Raises InputError for what has
     nothing in common.

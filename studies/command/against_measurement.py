@@ -19,7 +19,7 @@ from models.measured.time_shift import ChannelPair, TimeShift, time_shift
 from models.measured.timing import sample_timing
 from models.measured.units import factor_between
 from studies.command.comparison import channels_of
-from studies.command.differences import Quantity
+from studies.command.differences import ResultQuantity
 
 TIME_AXIS = "time [s]"
 DOUBTFUL_CORRELATION = 0.5
@@ -88,7 +88,7 @@ class ChannelComparison:
 
 
 @dataclass(frozen=True)
-class Overlay:
+class MeasurementOverlay:
     """Comparison of a measurement with a run: the time shift, the common channels, and notes on channels that could not
     be compared."""
 
@@ -144,7 +144,7 @@ def is_run_against_measurement(run: Path, measurement: Path) -> bool:
     )
 
 
-def overlay_of_run(run: Result, file: str | Path, time_shift_seconds: float | None = None) -> Overlay:
+def overlay_of_run(run: Result, file: str | Path, time_shift_seconds: float | None = None) -> MeasurementOverlay:
     """Compare a measurement with a run channel by channel, largest relative error first.
 
     Headers are ``name [unit]``, names those of the run's channels; units are converted. A run of several engines has a
@@ -174,10 +174,10 @@ def overlay_of_run(run: Result, file: str | Path, time_shift_seconds: float | No
     if not complete:
         raise InputError(file, "time", moved_by.seconds, "at this time shift (s) no sample lies within the run")
     notes = [*_missing_channel_notes(source, ours, engines), *dict.fromkeys(doubts)]
-    return Overlay(moved_by, sorted(complete, key=lambda channel_match: -channel_match.relative), notes)
+    return MeasurementOverlay(moved_by, sorted(complete, key=lambda channel_match: -channel_match.relative), notes)
 
 
-def _channels_by_engine(name: str, engines: list[str], run_quantities: Mapping[str, Quantity]) -> list[str]:
+def _channels_by_engine(name: str, engines: list[str], run_quantities: Mapping[str, ResultQuantity]) -> list[str]:
     """Names of the run's channels to compare with a measured channel: its own name, or this name followed by the name
     of an engine."""
     if name in run_quantities:
@@ -188,7 +188,7 @@ def _channels_by_engine(name: str, engines: list[str], run_quantities: Mapping[s
 
 
 def _missing_channel_notes(
-    measurement_source: Source, run_quantities: Mapping[str, Quantity], engines: list[str]
+    measurement_source: Source, run_quantities: Mapping[str, ResultQuantity], engines: list[str]
 ) -> Iterator[str]:
     """Yield a note on each measured channel that the run does not have, with the most similar name of the run."""
     for channel in measurement_source.channels:
@@ -200,7 +200,7 @@ def _missing_channel_notes(
 
 
 def _channel_pair(
-    measurement_source: Source, channel: Channel, run_quantity: Quantity, doubts: list[str]
+    measurement_source: Source, channel: Channel, run_quantity: ResultQuantity, doubts: list[str]
 ) -> ChannelPair:
     """Times and values of a channel in the run and in the measurement, both in the run's unit; doubts about the
     measured times are appended to ``doubts``.
@@ -292,11 +292,11 @@ def report(
     }
 
 
-def _overlay_lines(name: str, overlay: Overlay, overlay_count: int) -> Sequence[str]:
+def _overlay_lines(name: str, overlay: MeasurementOverlay, overlay_count: int) -> Sequence[str]:
     return [*([f"  {name}"] if overlay_count > 1 else []), *overlay.lines()]
 
 
-def draw_overlay(overlay: Overlay, title: str, path: Path) -> None:
+def draw_overlay(overlay: MeasurementOverlay, title: str, path: Path) -> None:
     """Save a figure of the channels with the largest relative errors: measurement and run, and below it their
     difference."""
     from models.drawing.figures import BLUE, DARK, VERMILION, add_heading, save, subplots

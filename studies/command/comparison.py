@@ -14,7 +14,7 @@ from models.core.errors import InputError
 from models.core.result import Result, load
 from models.core.told import DOUBT_ATTRIBUTES, Results
 from models.core.whole_files import whole_file
-from studies.command.differences import Quantity, QuantityDifference
+from studies.command.differences import QuantityDifference, ResultQuantity
 
 RESULT_SUFFIXES = (".nc", ".csv")
 PRINTED_QUANTITIES = 20
@@ -138,14 +138,16 @@ def _result_of_file(path: Path) -> Result | None:
     return load(netcdf_path) if netcdf_path.is_file() else None
 
 
-def _quantities_of_file(path: Path) -> Iterator[tuple[str, Quantity]]:
+def _quantities_of_file(path: Path) -> Iterator[tuple[str, ResultQuantity]]:
     """Yield name and values of each quantity of a file, with the error that its result states."""
     yield from _with_errors(
         _result_of_file(path), channels_of(load(path).data) if path.suffix == ".nc" else _quantities_of_table(path)
     )
 
 
-def _with_errors(run: Result | None, quantities: Iterable[tuple[str, Quantity]]) -> Iterator[tuple[str, Quantity]]:
+def _with_errors(
+    run: Result | None, quantities: Iterable[tuple[str, ResultQuantity]]
+) -> Iterator[tuple[str, ResultQuantity]]:
     """Yield name and values of each quantity of a result, with the error that the result states for the channel, if
     any."""
     errors = {} if run is None else errors_of(run)
@@ -154,7 +156,7 @@ def _with_errors(run: Result | None, quantities: Iterable[tuple[str, Quantity]])
         yield name, quantity if stated is None else replace(quantity, error=stated.error)
 
 
-def channels_of(data: Any) -> Iterator[tuple[str, Quantity]]:
+def channels_of(data: Any) -> Iterator[tuple[str, ResultQuantity]]:
     """Yield name and values of the numeric channels of a dataset over time or another axis. A channel with further axes
     gives one quantity for each entry of these."""
     kinds = ", ".join(str(data.attrs[kind]) for kind in KIND_ATTRIBUTES if kind in data.attrs)
@@ -171,7 +173,7 @@ def channels_of(data: Any) -> Iterator[tuple[str, Quantity]]:
                 for dim, i in index_by_dim.items()
             )
             values = channel.isel(index_by_dim).values.astype(float).reshape(-1)
-            quantity = Quantity(str(channel.attrs.get("units", "")), values, axis_name, grid, kinds)
+            quantity = ResultQuantity(str(channel.attrs.get("units", "")), values, axis_name, grid, kinds)
             yield ", ".join((str(name), *labels)), quantity
 
 
@@ -190,7 +192,7 @@ def _grid_of_dimension(channel: Any, dimension: Any) -> tuple[str, np.ndarray]:
     return f"{dimension} [{unit}]" if unit else str(dimension), channel[dimension].values.astype(float)
 
 
-def _quantities_of_table(path: Path) -> Iterator[tuple[str, Quantity]]:
+def _quantities_of_table(path: Path) -> Iterator[tuple[str, ResultQuantity]]:
     """Yield name and values of each numeric column of a CSV file over its first column; an empty cell is NaN."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
@@ -210,7 +212,7 @@ def _quantities_of_table(path: Path) -> Iterator[tuple[str, Quantity]]:
     grid = numeric.pop(axis_name, np.arange(len(rows), dtype=float))
     for head, values in numeric.items():
         name, _, unit = head.partition(" [")
-        yield name, Quantity(unit.rstrip("]"), values, axis_name, grid, labels=labels)
+        yield name, ResultQuantity(unit.rstrip("]"), values, axis_name, grid, labels=labels)
 
 
 def _numeric_cells(cells: tuple[str, ...]) -> np.ndarray | None:
@@ -222,7 +224,7 @@ def _numeric_cells(cells: tuple[str, ...]) -> np.ndarray | None:
 
 
 def _quantity_difference(
-    name: str, first_quantity: Quantity, second_quantity: Quantity, file: object
+    name: str, first_quantity: ResultQuantity, second_quantity: ResultQuantity, file: object
 ) -> QuantityDifference:
     """Difference of a quantity in two results; raises InputError if kinds, units or rows do not match."""
     if first_quantity.kind != second_quantity.kind:
@@ -265,7 +267,7 @@ def _quantity_difference(
 
 
 def _difference_in_time(
-    name: str, first_quantity: Quantity, second_quantity: Quantity, file: object
+    name: str, first_quantity: ResultQuantity, second_quantity: ResultQuantity, file: object
 ) -> QuantityDifference:
     """Difference of a quantity in two runs with rows at different times; the denser run is interpolated at the rows of
     the other by a cubic spline."""

@@ -6,7 +6,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ResultQuantity:
     """Values (n,) of a quantity of a result over ``grid`` (n,): times, another coordinate, the first column of a table,
     or row numbers.
 

@@ -19,7 +19,7 @@ PYTHON_START_KIND, IMPORTS_KIND, KERNELS_KIND = "start of Python", "imports", "c
 FIGURES_KIND, SAVING_KIND, OTHER_KIND = "figures", "saving", "everything else"
 OUTSIDE_ENGINES = "marching beside the engines"
 """Label of time spent in a controller, in wheels with their own steps, or in equations that belong to no engine."""
-KIND_OF_LIBRARY = {
+WORK_KIND_OF_LIBRARY = {
     "numba": KERNELS_KIND,
     "llvmlite": KERNELS_KIND,
     "matplotlib": FIGURES_KIND,
@@ -80,8 +80,8 @@ def kind_of_work(frame: FrameType) -> str:
         if name == "<module>" or path.parts[:1] == ("<frozen importlib._bootstrap>",):
             return IMPORTS_KIND
         for folder in (*path.parts[-4:-1], path.stem):
-            if folder in KIND_OF_LIBRARY:
-                return KIND_OF_LIBRARY[folder]
+            if folder in WORK_KIND_OF_LIBRARY:
+                return WORK_KIND_OF_LIBRARY[folder]
         if path.stem.endswith(("_figure", "_figures")) or name == "_figure":
             return FIGURES_KIND
         if (name, path.stem) == ("save", "result") or path.stem == "whole_files":

@@ -40,10 +40,10 @@ if TYPE_CHECKING:
 
 RECORDS_FOLDER, RUNS_FOLDER = "points", "runs"
 """Names of the folders of the records of finished points, and of the points' results."""
-MOST_POINTS = 10_000
+POINT_LIMIT = 10_000
 """Largest number of points of a sweep."""
 
-Record = dict[str, Any]
+PointRecord = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class SweepJob:
         assert first is not None
         raise first
 
-    def record(self, point_number: int) -> Record:
+    def record(self, point_number: int) -> PointRecord:
         """Run a point of the sweep; returns its record: its numbers by name, its failures (by engine, if the study
         gives them), and the errors and assumptions that its results state."""
         try:
@@ -113,11 +113,11 @@ class SweepJob:
         }
 
 
-def _json_array(records: Iterable[Record]) -> Arrays:
+def _json_array(records: Iterable[PointRecord]) -> Arrays:
     return {"record": np.array(list(map(json.dumps, records)))}
 
 
-def _failed_record(reason: object) -> Record:
+def _failed_record(reason: object) -> PointRecord:
     return {"numbers": {}, "failed": {"": str(reason)}, "results": {}}
 
 
@@ -150,8 +150,8 @@ def parse_range(text: str) -> tuple[str, tuple[Any, ...]]:
         if not _is_writable(value):
             allowed = "must be a finite number, a text, true, false or a list of these"
             raise InputError("--sweep", key, str(value), allowed)
-    if not 2 <= len(values) <= MOST_POINTS:
-        raise InputError("--sweep", key, value_text, f"gives {len(values)} value(s): 2 to {MOST_POINTS:,} make a sweep")
+    if not 2 <= len(values) <= POINT_LIMIT:
+        raise InputError("--sweep", key, value_text, f"gives {len(values)} value(s): 2 to {POINT_LIMIT:,} make a sweep")
     if len(set(map(_value_text, values))) < len(values):
         raise InputError("--sweep", key, value_text, "gives a value twice")
     return key, values
@@ -172,8 +172,8 @@ def _spaced_values(text: str, first_text: str, last_text: str, count_text: str) 
         ends, n = (float(first_text), float(last_text)), int(count_text)
     except ValueError:
         raise InputError("--sweep", "", text, "FROM and TO must be numbers and N a whole number of points") from None
-    if not np.isfinite(ends).all() or not 2 <= n <= MOST_POINTS:
-        raise InputError("--sweep", "", text, f"FROM and TO must be finite, N from 2 to {MOST_POINTS:,}")
+    if not np.isfinite(ends).all() or not 2 <= n <= POINT_LIMIT:
+        raise InputError("--sweep", "", text, f"FROM and TO must be finite, N from 2 to {POINT_LIMIT:,}")
     values = np.linspace(*ends, n).tolist()
     are_integers = all(re.fullmatch(r"\s*[+-]?\d+\s*", end) for end in (first_text, last_text)) and all(
         v == int(v) for v in values
@@ -233,7 +233,7 @@ def run(job: SweepJob, report_progress: Callable[[str, float], None], crew: Crew
     }
 
 
-def _sweep_columns(job: SweepJob, records: list[Record]) -> "SweepResults":
+def _sweep_columns(job: SweepJob, records: list[PointRecord]) -> "SweepResults":
     """Results of a sweep from the records of all points: a column per quantity, failures, and the errors and
     assumptions of the results."""
     from studies.command.sweep_figure import SweepResults
@@ -256,7 +256,7 @@ def _unit_of_key(job: SweepJob) -> str:
     return str(extra["unit"]) or "-" if isinstance(extra, dict) and "unit" in extra else "SI"
 
 
-def _records_of_points(job: SweepJob, report_progress: Callable[[str, float], None], crew: Crew) -> list[Record]:
+def _records_of_points(job: SweepJob, report_progress: Callable[[str, float], None], crew: Crew) -> list[PointRecord]:
     """Records of all points of a sweep, computed by workers; raises InputError if no point failed but none has a number
     to show."""
 

@@ -14,7 +14,7 @@ from matplotlib.transforms import IdentityTransform
 
 from models.drawing.figures import COLOURS, DARK, GREY, LABELS, ORANGE, PINK, SKY
 from studies.pictures.drawing import draw_frame
-from studies.pictures.film import FilmedMotion, Stage, largest_differences
+from studies.pictures.film import FilmedMotion, FilmStage, largest_differences
 
 PAGE_WIDTH, PAGE_HEIGHT = 1280, 720
 PAGE_MARGIN, TITLE_HEIGHT, PICTURE_HEIGHT = 12, 66, 400
@@ -29,16 +29,20 @@ FONT_SIZES: dict[Any, Any] = {
 """Font sizes (points) that are readable if the page is shown as wide as other figures."""
 
 
-class Page:
+class FilmPage:
     """Page of 1280 x 720 pixels on which the frames of filmed motions are drawn one after the other."""
 
-    def __init__(self, stage: Stage, motions: list[FilmedMotion]) -> None:
-        self.stage, self.motions = stage, motions
-        self._wide = (PAGE_WIDTH - PAGE_MARGIN * (len(motions) + 1)) // len(motions)
-        self._lefts = [PAGE_MARGIN + i * (self._wide + PAGE_MARGIN) for i in range(len(motions))]
+    def __init__(self, film_stage: FilmStage, filmed_motions: list[FilmedMotion]) -> None:
+        self.stage, self.motions = film_stage, filmed_motions
+        self._wide = (PAGE_WIDTH - PAGE_MARGIN * (len(filmed_motions) + 1)) // len(filmed_motions)
+        self._lefts = [PAGE_MARGIN + i * (self._wide + PAGE_MARGIN) for i in range(len(filmed_motions))]
         self._forces = [
-            [arrow.vectors @ stage.curve.direction / 1e3 for arrow in motion.arrows if arrow.kind == stage.curve.kind]
-            for motion in motions
+            [
+                arrow.vectors @ film_stage.curve.direction / 1e3
+                for arrow in motion.arrows
+                if arrow.kind == film_stage.curve.kind
+            ]
+            for motion in filmed_motions
         ]
         with rc_context(FONT_SIZES):
             self._draw()
@@ -138,11 +142,11 @@ CURVE_COLOURS = (DARK, PINK, ORANGE, SKY, GREY)
 """Colours of the force curves, which differ from the engines' colours."""
 
 
-def difference_sentence(motions: list[FilmedMotion]) -> str:
+def difference_sentence(filmed_motions: list[FilmedMotion]) -> str:
     """Sentence on the largest differences between two engines over the film; with a single engine, its name."""
-    if len(motions) == 1:
-        return f"poses as {LABELS[motions[0].engine]} reports them"
-    position_gap, turns, forces = largest_differences(*motions)
+    if len(filmed_motions) == 1:
+        return f"poses as {LABELS[filmed_motions[0].engine]} reports them"
+    position_gap, turns, forces = largest_differences(*filmed_motions)
     return (
         "poses as each engine reports them; largest difference over the film: "
         f"places {position_gap:.1e} m, rotations {turns:.1e} rad, forces {forces:.1e} N"
