@@ -175,7 +175,7 @@ def run_scene(
         crew = crew_of(job.check(), workers, cluster)
         folder = folder_of(f"{Path(scene).stem}-sweep", RECORDS_FOLDER, "", out, resume)
         work = partial(run_points, replace(job, folder=folder), crew=crew)
-        return finish(telling(work), folder, as_json, strict=strict)
+        return finish(telling(work), folder, as_json, is_strict=strict)
     loaded = load_scene(scene, changes)
     loaded = loaded.model_copy(
         update={"error": loaded.error and not no_error, **crew_changes_by_options(workers, cluster)}
@@ -296,8 +296,8 @@ def identify(
     folder = folder_of(f"{Path(loaded.file).stem}-identify", STAGES_FOLDER, "", out, resume)
     usual = engines[0] if engines else ""
 
-    def computed(tell: Callable[[str, float], None]) -> dict[str, Any]:
-        return report(loaded, measurement, keys, folder, tell, profiles, engine=usual, low_pass=low_pass)
+    def computed(report_progress: Callable[[str, float], None]) -> dict[str, Any]:
+        return report(loaded, measurement, keys, folder, report_progress, profiles, engine=usual, low_pass=low_pass)
 
     finish(computed, folder, as_json, (), False, loaded.system)
 

@@ -173,13 +173,13 @@ def _distinct_curves(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def spectra_figure(
-    linearised_vehicle: LinearVehicle, excitation: Excitation, speed: float, heading: FigureHeading, figure_path: Path
+    linear_vehicle: LinearVehicle, excitation: Excitation, speed: float, heading: FigureHeading, figure_path: Path
 ) -> None:
     """Save a figure of the one-sided spectral densities of accelerations and tyre forces over frequency at a speed
     (m/s); no figure if all are 0."""
     frequency = np.geomspace(0.1, 100.0, 800)
-    densities = one_sided_densities(linearised_vehicle, excitation, speed, frequency)
-    moving_kinds = {output.kind for i, output in enumerate(linearised_vehicle.outputs) if densities[:, i].any()}
+    densities = one_sided_densities(linear_vehicle, excitation, speed, frequency)
+    moving_kinds = {output.kind for i, output in enumerate(linear_vehicle.outputs) if densities[:, i].any()}
     shown = [kind for kind in ("acceleration", "tyre force") if kind in moving_kinds]
     if not shown:
         return
@@ -187,7 +187,7 @@ def spectra_figure(
     units = {"acceleration": "(m/s²)²/Hz", "tyre force": "N²/Hz"}
     for axis, kind in zip(axes[0], shown, strict=True):
         curves = {
-            output.name: densities[:, i] for i, output in enumerate(linearised_vehicle.outputs) if output.kind == kind
+            output.name: densities[:, i] for i, output in enumerate(linear_vehicle.outputs) if output.kind == kind
         }
         for label, values in _distinct_curves(curves).items():
             axis.loglog(frequency, values, label=label)
@@ -358,7 +358,7 @@ def nonlinear_figure(nonlinear_sweep: Nonlinear, heading: FigureHeading, figure_
 
 def engine_spectra_figure(
     runs_by_engine: Mapping[str, Ride],
-    linearised_vehicle: LinearVehicle,
+    linear_vehicle: LinearVehicle,
     road_excitation: Excitation,
     speed: float,
     heading: FigureHeading,
@@ -367,9 +367,9 @@ def engine_spectra_figure(
     """Save a figure of the spectra of the engines' runs, by Welch's method, and of the statistically linearised
     vehicle."""
     frequency = np.geomspace(0.3, 40.0, 300)
-    expected = one_sided_densities(linearised_vehicle, road_excitation, speed, frequency)
+    expected = one_sided_densities(linear_vehicle, road_excitation, speed, frequency)
     first = next(iter(runs_by_engine.values()))
-    shown = [i for i in range(len(linearised_vehicle.outputs)) if np.isfinite(first.outputs[:, i]).all()][
+    shown = [i for i in range(len(linear_vehicle.outputs)) if np.isfinite(first.outputs[:, i]).all()][
         :DRAWN_OUTPUT_LIMIT
     ]
     figure, axes = _few_panels(len(shown))
@@ -379,7 +379,7 @@ def engine_spectra_figure(
             label = f"{LABELS[engine]}, nonlinear in time"
             axis.loglog(f, density[:, i], line, linewidth=width, color=ENGINES[engine], label=label)
         axis.loglog(frequency, expected[:, i], "k", label="statistical linearisation")
-        output, top = linearised_vehicle.outputs[i], expected[:, i].max()
+        output, top = linear_vehicle.outputs[i], expected[:, i].max()
         unit = f"one-sided density [{_squared_unit(output.unit)}/Hz]"
         axis.set(xlabel="frequency [Hz]", ylabel=unit, title=output.name.capitalize(), ylim=(1e-5 * top, 5 * top))
     legend_below(figure, axes[0], columns=3)
@@ -394,8 +394,7 @@ def _few_panels(panel_count: int) -> tuple[Figure, list[Axes]]:
 
 
 def _legend_under_panel(axis: Axes, relative_drop: float = 0.18) -> None:
-    """Put the legend below a panel, ``relative_drop`` times the panel's height lower to leave room for the axis
-    label."""
+    """Put the legend below a panel, ``relative_drop`` times the panel's height lower to leave room for the label."""
     axis.legend(fontsize=SMALL_TEXT, loc="upper center", bbox_to_anchor=(0.5, -relative_drop), ncols=2)
 
 

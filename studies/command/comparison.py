@@ -42,13 +42,13 @@ def compare(first_path: Path, second_path: Path) -> tuple[list[QuantityDifferenc
 
 
 def compare_runs(
-    first_run: Result, second_run: Result, names: tuple[str, str]
+    first_run: Result, second_run: Result, run_names: tuple[str, str]
 ) -> tuple[list[QuantityDifference], list[str]]:
-    """Differences of all quantities of two results in memory, and notes on quantities that occur in only one; ``names``
-    are the results' names in messages."""
+    """Differences of all quantities of two results in memory, and notes on quantities that occur in only one;
+    ``run_names`` are the results' names in messages."""
     a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first_run, second_run))
-    differences = [_quantity_difference(key, a[key], b[key], names[1]) for key in a if key in b]
-    return _sorted_by_share(differences, *names), _notes_on_missing("", (names[0], a), (names[1], b))
+    differences = [_quantity_difference(key, a[key], b[key], run_names[1]) for key in a if key in b]
+    return _sorted_by_share(differences, *run_names), _notes_on_missing("", (run_names[0], a), (run_names[1], b))
 
 
 def _sorted_by_share(
@@ -62,30 +62,30 @@ def _sorted_by_share(
     return sorted(differences, key=lambda difference: -difference.share)
 
 
-def _notes_on_missing(prefix: str, *sides: tuple[object, Collection[str]]) -> list[str]:
+def _notes_on_missing(note_prefix: str, *names_of_results: tuple[object, Collection[str]]) -> list[str]:
     """Notes on quantities or files that occur in only one of the two results."""
     return [
-        f"{prefix}only in {path}: {', '.join(only_here)}"
-        for (path, names), (_, names_of_other) in (sides, sides[::-1])
+        f"{note_prefix}only in {path}: {', '.join(only_here)}"
+        for (path, names), (_, names_of_other) in (names_of_results, names_of_results[::-1])
         if (only_here := [name for name in names if name not in names_of_other])
     ]
 
 
-def _file_pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
+def _file_pairs(first_path: Path, second_path: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
     """Pairs of files to compare, with their name: the two given files, or the files of equal name in both folders; and
     notes on files that occur in only one folder."""
-    for path in (earlier, later):
+    for path in (first_path, second_path):
         if not path.exists():
             raise InputError(path, "", None, "no such file or folder")
         if path.is_file() and path.suffix not in RESULT_SUFFIXES:
             raise InputError(path, "", None, "is no result: name a folder, a netCDF file (.nc) or a table (.csv)")
-    kinds = ["file" if path.is_file() else "folder" for path in (earlier, later)]
+    kinds = ["file" if path.is_file() else "folder" for path in (first_path, second_path)]
     if kinds[0] != kinds[1]:
-        raise InputError(later, "", None, f"is a {kinds[1]} and {earlier} a {kinds[0]}: name two of a kind")
-    if earlier.is_file():
-        return [("", earlier, later)], []
-    first, second = _result_files(earlier), _result_files(later)
-    for folder, files in ((earlier, first), (later, second)):
+        raise InputError(second_path, "", None, f"is a {kinds[1]} and {first_path} a {kinds[0]}: name two of a kind")
+    if first_path.is_file():
+        return [("", first_path, second_path)], []
+    first, second = _result_files(first_path), _result_files(second_path)
+    for folder, files in ((first_path, first), (second_path, second)):
         if not files:
             raise InputError(folder, "", None, "holds no results (.nc or .csv): name the folder of a run")
     common = [name for name in first if name in second]
@@ -93,10 +93,10 @@ def _file_pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]
         return [("", next(iter(first.values())), next(iter(second.values())))], []
     if not common:
         raise InputError(
-            later, "", None, f"has no results of the same names as {earlier}: compare two results of one study"
+            second_path, "", None, f"has no results of the same names as {first_path}: compare two results of one study"
         )
     return [(name, first[name], second[name]) for name in common], _notes_on_missing(
-        "", (earlier, first), (later, second)
+        "", (first_path, first), (second_path, second)
     )
 
 
@@ -114,10 +114,10 @@ def _result_files(results_folder: Path) -> dict[str, Path]:
     return {path.relative_to(results_folder).as_posix(): path for path in chosen}
 
 
-def _holds_same_table(path: Path) -> bool:
+def _holds_same_table(result_path: Path) -> bool:
     """Whether the CSV file of the same name as a netCDF file holds the same table: all channels have one common
     axis."""
-    return path.with_suffix(".csv").exists() and len(load(path).data.sizes) < 2
+    return result_path.with_suffix(".csv").exists() and len(load(result_path).data.sizes) < 2
 
 
 def results_of(first_path: Path, second_path: Path) -> dict[str, Result]:
@@ -132,35 +132,36 @@ def results_of(first_path: Path, second_path: Path) -> dict[str, Result]:
     }
 
 
-def _result_of_file(path: Path) -> Result | None:
+def _result_of_file(result_path: Path) -> Result | None:
     """The saved result of a netCDF file, or of the netCDF file beside a CSV table; None if there is none."""
-    netcdf_path = path.with_suffix(".nc")
+    netcdf_path = result_path.with_suffix(".nc")
     return load(netcdf_path) if netcdf_path.is_file() else None
 
 
-def _quantities_of_file(path: Path) -> Iterator[tuple[str, ResultQuantity]]:
+def _quantities_of_file(result_path: Path) -> Iterator[tuple[str, ResultQuantity]]:
     """Yield name and values of each quantity of a file, with the error that its result states."""
     yield from _with_errors(
-        _result_of_file(path), channels_of(load(path).data) if path.suffix == ".nc" else _quantities_of_table(path)
+        _result_of_file(result_path),
+        channels_of(load(result_path).data) if result_path.suffix == ".nc" else _quantities_of_table(result_path),
     )
 
 
 def _with_errors(
-    run: Result | None, quantities: Iterable[tuple[str, ResultQuantity]]
+    saved_run: Result | None, quantities: Iterable[tuple[str, ResultQuantity]]
 ) -> Iterator[tuple[str, ResultQuantity]]:
     """Yield name and values of each quantity of a result, with the error that the result states for the channel, if
     any."""
-    errors = {} if run is None else errors_of(run)
+    errors = {} if saved_run is None else errors_of(saved_run)
     for name, quantity in quantities:
         stated = errors.get(name.partition(", ")[0])
         yield name, quantity if stated is None else replace(quantity, error=stated.error)
 
 
-def channels_of(data: Any) -> Iterator[tuple[str, ResultQuantity]]:
+def channels_of(dataset: Any) -> Iterator[tuple[str, ResultQuantity]]:
     """Yield name and values of the numeric channels of a dataset over time or another axis. A channel with further axes
     gives one quantity for each entry of these."""
-    kinds = ", ".join(str(data.attrs[kind]) for kind in KIND_ATTRIBUTES if kind in data.attrs)
-    for name, channel in data.data_vars.items():
+    kinds = ", ".join(str(dataset.attrs[kind]) for kind in KIND_ATTRIBUTES if kind in dataset.attrs)
+    for name, channel in dataset.data_vars.items():
         if channel.dtype.kind not in "fiu" or channel.size == 0:
             continue
         dimension = _dimension_along(channel)
@@ -192,10 +193,10 @@ def _grid_of_dimension(channel: Any, dimension: Any) -> tuple[str, np.ndarray]:
     return f"{dimension} [{unit}]" if unit else str(dimension), channel[dimension].values.astype(float)
 
 
-def _quantities_of_table(path: Path) -> Iterator[tuple[str, ResultQuantity]]:
+def _quantities_of_table(table_path: Path) -> Iterator[tuple[str, ResultQuantity]]:
     """Yield name and values of each numeric column of a CSV file over its first column; an empty cell is NaN."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
+        with table_path.open(newline="", encoding="utf-8-sig") as file:
             heads, *rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
         names = [head.strip() for head in heads]
         for name, count in Counter(names).items():
@@ -203,9 +204,9 @@ def _quantities_of_table(path: Path) -> Iterator[tuple[str, ResultQuantity]]:
                 raise ValueError(f"two columns are called {name!r}")
         columns = dict(zip(names, zip(*rows, strict=True), strict=True)) if rows else {}
     except (OSError, ValueError, csv.Error) as error:
-        raise InputError(path, "", None, f"is not a table of results: {error}") from None
+        raise InputError(table_path, "", None, f"is not a table of results: {error}") from None
     if not columns:
-        raise InputError(path, "", None, "is not a table of results: it has no rows")
+        raise InputError(table_path, "", None, "is not a table of results: it has no rows")
     numeric = {head: values for head, cells in columns.items() if (values := _numeric_cells(cells)) is not None}
     axis_name = names[0]
     labels = () if axis_name in numeric else columns[axis_name]
@@ -215,38 +216,43 @@ def _quantities_of_table(path: Path) -> Iterator[tuple[str, ResultQuantity]]:
         yield name, ResultQuantity(unit.rstrip("]"), values, axis_name, grid, labels=labels)
 
 
-def _numeric_cells(cells: tuple[str, ...]) -> np.ndarray | None:
+def _numeric_cells(column_cells: tuple[str, ...]) -> np.ndarray | None:
     try:
-        values = np.array([float(cell) if cell.strip() else np.nan for cell in cells])
+        values = np.array([float(cell) if cell.strip() else np.nan for cell in column_cells])
     except ValueError:
         return None
     return values if np.isfinite(values).any() else None
 
 
 def _quantity_difference(
-    name: str, first_quantity: ResultQuantity, second_quantity: ResultQuantity, file: object
+    quantity_name: str, first_quantity: ResultQuantity, second_quantity: ResultQuantity, file_name: object
 ) -> QuantityDifference:
     """Difference of a quantity in two results; raises InputError if kinds, units or rows do not match."""
     if first_quantity.kind != second_quantity.kind:
         raise InputError(
-            file, name, second_quantity.kind, f"the other run is of {first_quantity.kind}: compare two runs of one kind"
+            file_name,
+            quantity_name,
+            second_quantity.kind,
+            f"the other run is of {first_quantity.kind}: compare two runs of one kind",
         )
     if (first_quantity.unit, first_quantity.over) != (second_quantity.unit, second_quantity.over):
         raise InputError(
-            file,
-            name,
+            file_name,
+            quantity_name,
             f"{second_quantity.unit} over {second_quantity.over}",
             f"the other one is in {first_quantity.unit} over {first_quantity.over}",
         )
     for label, other in zip(first_quantity.labels, second_quantity.labels, strict=False):
         if label != other:
-            raise InputError(file, name, other, f"has other rows than the first, which has {label!r} there")
+            raise InputError(
+                file_name, quantity_name, other, f"has other rows than the first, which has {label!r} there"
+            )
     near = EQUAL_POSITIONS * np.abs(first_quantity.grid).max(initial=0.0)
     if first_quantity.grid.shape == second_quantity.grid.shape and np.allclose(
         first_quantity.grid, second_quantity.grid, rtol=0.0, atol=near
     ):
         return QuantityDifference(
-            name,
+            quantity_name,
             first_quantity.unit,
             first_quantity.over,
             first_quantity.grid,
@@ -262,12 +268,14 @@ def _quantity_difference(
             if len(first_quantity.grid) == len(second_quantity.grid)
             else f", {len(second_quantity.grid)} instead of {len(first_quantity.grid)}"
         )
-        raise InputError(file, name, None, f"has rows at other places ({first_quantity.over}) than the first{rows}")
-    return _difference_in_time(name, first_quantity, second_quantity, file)
+        raise InputError(
+            file_name, quantity_name, None, f"has rows at other places ({first_quantity.over}) than the first{rows}"
+        )
+    return _difference_in_time(quantity_name, first_quantity, second_quantity, file_name)
 
 
 def _difference_in_time(
-    name: str, first_quantity: ResultQuantity, second_quantity: ResultQuantity, file: object
+    quantity_name: str, first_quantity: ResultQuantity, second_quantity: ResultQuantity, file_name: object
 ) -> QuantityDifference:
     """Difference of a quantity in two runs with rows at different times; the denser run is interpolated at the rows of
     the other by a cubic spline."""
@@ -280,19 +288,19 @@ def _difference_in_time(
     )
     unread = "cannot be read at other times: the"
     if not (np.diff(fine.grid) > 0.0).all():
-        raise InputError(file, name, None, f"{unread} times of the denser run do not increase")
+        raise InputError(file_name, quantity_name, None, f"{unread} times of the denser run do not increase")
     if not np.isfinite(fine.values).all():
-        raise InputError(file, name, None, f"{unread} denser run holds what is no number")
+        raise InputError(file_name, quantity_name, None, f"{unread} denser run holds what is no number")
     is_within = (coarse.grid >= fine.grid[0] - 1e-9) & (coarse.grid <= fine.grid[-1] + 1e-9)
     if not (is_within.sum() > 1 and len(fine.grid) > 3):
-        raise InputError(file, name, None, "has no times in common with the first")
+        raise InputError(file_name, quantity_name, None, "has no times in common with the first")
     common_times = coarse.grid[is_within]
     pair = CubicSpline(fine.grid, fine.values)(common_times), coarse.values[is_within]
     extent = _common_extent(common_times, first_quantity.grid, second_quantity.grid)
     note = f"on {len(common_times)} common rows, the denser run by a cubic spline{extent}"
     values_of_both = pair if fine is first_quantity else pair[::-1]
     return QuantityDifference(
-        name,
+        quantity_name,
         first_quantity.unit,
         first_quantity.over,
         common_times,
@@ -302,10 +310,10 @@ def _difference_in_time(
     )
 
 
-def _common_extent(common_times: np.ndarray, *grids: np.ndarray) -> str:
+def _common_extent(common_times: np.ndarray, *times_of_runs: np.ndarray) -> str:
     """Phrase on the compared times (s) if one run begins later or ends earlier than the other; else ""."""
-    begin, end = (float(extreme(np.concatenate(grids))) for extreme in (np.min, np.max))
-    spacing = min(float(np.diff(grid).max()) for grid in grids)
+    begin, end = (float(extreme(np.concatenate(times_of_runs))) for extreme in (np.min, np.max))
+    spacing = min(float(np.diff(grid).max()) for grid in times_of_runs)
     first, last = common_times[0], common_times[-1]
     if first - begin < spacing and end - last < spacing:
         return ""
@@ -364,17 +372,21 @@ def _file_lines(differences: list[QuantityDifference]) -> list[str]:
     ]
 
 
-def _difference_text(difference: QuantityDifference) -> str:
+def _difference_text(quantity_difference: QuantityDifference) -> str:
     """Text on where a difference is largest, and on whether it lies within the stated errors."""
     return (
-        f"{difference.where}; rms within the stated error of {difference.stated:.2g}"
-        if difference.within
-        else difference.where
+        f"{quantity_difference.where}; rms within the stated error of {quantity_difference.stated:.2g}"
+        if quantity_difference.within
+        else quantity_difference.where
     )
 
 
 def _figure(
-    first_path: Path, second_path: Path, differences: list[QuantityDifference], results: Results, path: Path
+    first_path: Path,
+    second_path: Path,
+    differences: list[QuantityDifference],
+    shown_results: Results,
+    figure_path: Path,
 ) -> None:
     """Save a figure of both results and, below, their difference, for the three quantities that differ most; of one
     quantity if all are equal."""
@@ -408,5 +420,5 @@ def _figure(
     for lowest, difference in zip(axes[-1], shown, strict=True):
         lowest.set_xlabel(difference.over)
     legend_below(figure, axes[0, 0], columns=1)
-    add_heading(figure, f"Largest differences of {len(differences)} quantities", results)
-    save(figure, path)
+    add_heading(figure, f"Largest differences of {len(differences)} quantities", shown_results)
+    save(figure, figure_path)

@@ -51,9 +51,15 @@ def export(scene: Any, engine: str, output_path: Path | None) -> dict[str, Any]:
     return {"file": str(path), "has": [*answer.has], "left out": [*answer.left_out]}
 
 
-def export_lines(title: str, export_record: dict[str, Any]) -> list[str]:
+def export_lines(scene_title: str, export_record: dict[str, Any]) -> list[str]:
     """Lines for the screen: the scene's title, and the contents and omissions of the exported file."""
     path, left_out = export_record["file"], [f"    {text}" for text in export_record["left out"]]
     head = "  left out:" if left_out else "  leaves nothing out"
     opened = f"python -m mujoco.viewer --mjcf={path}" if path.endswith(SUFFIXES["mujoco"]) else f"python {path}"
-    return [f"{title}: {path}", f"  has {', '.join(export_record['has'])}", head, *left_out, f"  open it: {opened}"]
+    return [
+        f"{scene_title}: {path}",
+        f"  has {', '.join(export_record['has'])}",
+        head,
+        *left_out,
+        f"  open it: {opened}",
+    ]

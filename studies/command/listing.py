@@ -27,10 +27,10 @@ def print_lists() -> None:
     )
 
 
-def _print_titled_list(title: str, entries: dict[str, str]) -> None:
-    if not entries:
+def _print_titled_list(title: str, descriptions: dict[str, str]) -> None:
+    if not descriptions:
         return
-    width = max(map(len, entries))
+    width = max(map(len, descriptions))
     print(title)
-    for name, text in entries.items():
+    for name, text in descriptions.items():
         print(f"  {name:<{width}} {text}")

@@ -64,19 +64,19 @@ class Profiler:
             self.seconds[OTHER_KIND if frame is None else kind_of_work(frame)] += current_time - last_time
             last_time = current_time
 
-    def run_profiled(self, work: Callable[[Any], dict[str, Any]], report_progress: Any) -> dict[str, Any]:
+    def run_profiled(self, run_study: Callable[[Any], dict[str, Any]], report_progress: Any) -> dict[str, Any]:
         """Run a study, stop the profiler, and return the study's summary with the profile's lines."""
-        summary = work(report_progress)
+        summary = run_study(report_progress)
         self._over.set()
         self._thread.join()
         spent: dict[str, float] = dict(sorted(self.seconds.items(), key=lambda part_and_seconds: -part_and_seconds[1]))
         return summary | {"profile": spent, "table": [*summary.get("table", []), *profile_lines(spent)]}
 
 
-def kind_of_work(frame: FrameType) -> str:
+def kind_of_work(innermost_frame: FrameType) -> str:
     """Kind of work of a call stack, by its innermost call that can be classified."""
     engine, forces = "", False
-    for name, path in _calls_of_stack(frame):
+    for name, path in _calls_of_stack(innermost_frame):
         if name == "<module>" or path.parts[:1] == ("<frozen importlib._bootstrap>",):
             return IMPORTS_KIND
         for folder in (*path.parts[-4:-1], path.stem):
@@ -95,25 +95,26 @@ def kind_of_work(frame: FrameType) -> str:
     return f"building in {engine}" if engine else OTHER_KIND
 
 
-def _calls_of_stack(frame: FrameType | None) -> Iterator[tuple[str, PurePath]]:
+def _calls_of_stack(innermost_frame: FrameType | None) -> Iterator[tuple[str, PurePath]]:
     """Yield name and file of each function of a call stack, the innermost first, down to the script itself."""
-    while frame is not None and frame.f_globals.get("__name__") != "__main__":
-        yield frame.f_code.co_name, PurePath(frame.f_code.co_filename)
-        frame = frame.f_back
+    while innermost_frame is not None and innermost_frame.f_globals.get("__name__") != "__main__":
+        yield innermost_frame.f_code.co_name, PurePath(innermost_frame.f_code.co_filename)
+        innermost_frame = innermost_frame.f_back
 
 
-def _engine(path: PurePath) -> str:
+def _engine(source_path: PurePath) -> str:
     """Name of the engine that a source file belongs to, in its own package or in ``models/engines``; else ""."""
-    if path.parent.name in ENGINES:
-        return path.parent.name
-    named = (engine for engine in ENGINES if engine in path.stem)
-    return next(named, "") if path.parent.name == "engines" else ""
+    if source_path.parent.name in ENGINES:
+        return source_path.parent.name
+    named = (engine for engine in ENGINES if engine in source_path.stem)
+    return next(named, "") if source_path.parent.name == "engines" else ""
 
 
-def profile_lines(spent: dict[str, float]) -> list[str]:
-    """Lines for the screen: seconds and share of each kind of work, in the order of ``spent``."""
-    total_seconds = sum(spent.values())
+def profile_lines(seconds_by_kind: dict[str, float]) -> list[str]:
+    """Lines for the screen: seconds and share of each kind of work, in the order of ``seconds_by_kind``."""
+    total_seconds = sum(seconds_by_kind.values())
     rows = [
-        f"    {work_part:<30} {seconds:8.2f} s {seconds / total_seconds:6.1%}" for work_part, seconds in spent.items()
+        f"    {work_part:<30} {seconds:8.2f} s {seconds / total_seconds:6.1%}"
+        for work_part, seconds in seconds_by_kind.items()
     ]
     return [f"  where {total_seconds:.1f} s went, by a look every {1000 * SAMPLING_PERIOD:.0f} ms", *rows]

@@ -24,13 +24,13 @@ COMPILATION_SECONDS = 1.0
 class SecondCompiler(CompilationTimer):
     """Observer of compilation that starts a command once, when this process has compiled for COMPILATION_SECONDS."""
 
-    def __init__(self, command: list[str]) -> None:
+    def __init__(self, process_command: list[str]) -> None:
         super().__init__()
-        self.command = command
+        self.command = process_command
         self.process: subprocess.Popen[bytes] | None = None
 
-    def _start(self, *event: Any) -> None:
-        super()._start(*event)
+    def _start(self, *compiler_event: Any) -> None:
+        super()._start(*compiler_event)
         if self.process is None and self.compilation_seconds() > COMPILATION_SECONDS:
             nowhere = subprocess.DEVNULL
             self.process = subprocess.Popen(self.command, stdin=nowhere, stdout=nowhere, stderr=nowhere)
@@ -44,18 +44,20 @@ class SecondCompiler(CompilationTimer):
 
 
 @contextmanager
-def second_process_compiles(name: str, changes: list[str], scene: Any, engines: tuple[str, ...]) -> Iterator[None]:
+def second_process_compiles(
+    scene_name: str, key_changes: list[str], scene: Any, engines: tuple[str, ...]
+) -> Iterator[None]:
     """Context in which a second process compiles the kernels of the scene's last engine if they are missing.
 
-    name, changes : which scene this is, as the user gave them. Nothing is run twice that has workers of its own, or
-    code of the user's.
+    scene_name, key_changes : which scene this is, as the user gave them. Nothing is run twice that has workers of its
+    own, or code of the user's.
     """
     idle = len(engines) > 1 and (os.cpu_count() or 1) > 1 and sys.stderr.isatty()
     if not idle or not needs_no_extras(scene, engines, study_of(scene)):
         yield
         return
     with TemporaryDirectory() as folder:
-        request = json.dumps([name, changes, engines[-1], scene.error, folder])
+        request = json.dumps([scene_name, key_changes, engines[-1], scene.error, folder])
         compiler = SecondCompiler([sys.executable, "-P", "-m", __name__, request])
         compiler.attach()
         try:
@@ -64,10 +66,10 @@ def second_process_compiles(name: str, changes: list[str], scene: Any, engines: 
             compiler.end()
 
 
-def run_for_kernels(name: str, changes: list[str], engine: str, error: bool, output_folder: str) -> None:
+def run_for_kernels(scene_name: str, key_changes: list[str], engine: str, with_error: bool, output_folder: str) -> None:
     """Run a scene in one engine, which compiles its kernels; results are saved in ``output_folder``. The scene is
     checked by the first process."""
-    scene = load_scene(name, changes).model_copy(update={"error": error})
+    scene = load_scene(scene_name, key_changes).model_copy(update={"error": with_error})
     study_of(scene).run(scene, (engine,), Path(output_folder), lambda text, share: None)
 
 

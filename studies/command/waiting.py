@@ -57,12 +57,12 @@ class CompilationTimer:
         """Stop listening to numba's compilation events."""
         self._remove()
 
-    def _start(self, *event: Any) -> None:
+    def _start(self, *compiler_event: Any) -> None:
         if self.depth == 0:
             self.since = time.monotonic()
         self.depth += 1
 
-    def _end_compilation(self, *event: Any) -> None:
+    def _end_compilation(self, *compiler_event: Any) -> None:
         self.depth = max(0, self.depth - 1)
         if self.depth == 0:
             self.total += time.monotonic() - self.since
@@ -90,9 +90,9 @@ class ProgressState:
     compilations: CompilationTimer = field(default_factory=CompilationTimer)
     _march: tuple[Any, float] = (None, 0.0)
 
-    def tell(self, text: str, share: float) -> None:
+    def tell(self, task_text: str, finished_share: float) -> None:
         """Set the bar's text to the task that begins, and its finished share (0 to 1)."""
-        self.text, self.share = text, min(max(share, 0.0), 1.0)
+        self.text, self.share = task_text, min(max(finished_share, 0.0), 1.0)
 
     def state(self) -> tuple[str, float | None, str]:
         """Current task, finished share and text of the remaining time for the bar; the share is None if it is
@@ -120,14 +120,19 @@ class ProgressState:
         return self.text, share, _time_left_text(_remaining_seconds(share, since), worked)
 
 
-def _remaining_seconds(share: float, seconds: float) -> float | None:
-    """Remaining time (s) of a task of which ``share`` took ``seconds``; None while the share is too small."""
-    return seconds * (1.0 - share) / share if share > LEAST_SHARE else None
+def _remaining_seconds(finished_share: float, elapsed_seconds: float) -> float | None:
+    """Remaining time (s) of a task of which ``finished_share`` took ``elapsed_seconds``; None while the share is too
+    small."""
+    return elapsed_seconds * (1.0 - finished_share) / finished_share if finished_share > LEAST_SHARE else None
 
 
-def _time_left_text(seconds: float | None, elapsed_seconds: float) -> str:
+def _time_left_text(remaining_seconds: float | None, elapsed_seconds: float) -> str:
     """Text of the remaining time or, if it is unknown, of the elapsed time."""
-    return f"{_duration_text(elapsed_seconds)} so far" if seconds is None else f"{_duration_text(seconds)} left"
+    return (
+        f"{_duration_text(elapsed_seconds)} so far"
+        if remaining_seconds is None
+        else f"{_duration_text(remaining_seconds)} left"
+    )
 
 
 def _duration_text(seconds: float) -> str:
@@ -135,7 +140,7 @@ def _duration_text(seconds: float) -> str:
 
 
 @contextmanager
-def progress_bar(text: str, system: str = "") -> Iterator[ReportProgress]:
+def progress_bar(task_text: str, system_name: str = "") -> Iterator[ReportProgress]:
     """Context that shows a progress bar on the terminal if its block takes longer than BAR_DELAY; it yields the
     function that reports progress.
 
@@ -144,7 +149,7 @@ def progress_bar(text: str, system: str = "") -> Iterator[ReportProgress]:
     if not sys.stderr.isatty():
         yield lambda text, share: None
         return
-    waiting, is_over = ProgressState(text, system), threading.Event()
+    waiting, is_over = ProgressState(task_text, system_name), threading.Event()
     thread = threading.Thread(target=_draw_bar, args=(waiting, is_over), daemon=True)
     thread.start()
     try:
@@ -155,9 +160,9 @@ def progress_bar(text: str, system: str = "") -> Iterator[ReportProgress]:
         waiting.compilations.detach()
 
 
-def _draw_bar(progress_state: ProgressState, finished: threading.Event) -> None:
-    """Draw the progress bar from BAR_DELAY on until ``finished`` is set."""
-    while not finished.wait(BAR_PERIOD):
+def _draw_bar(progress_state: ProgressState, finished_event: threading.Event) -> None:
+    """Draw the progress bar from BAR_DELAY on until ``finished_event`` is set."""
+    while not finished_event.wait(BAR_PERIOD):
         progress_state.compilations.attach()
         progress_state.state()  # which sees when a march begins
         if time.monotonic() - progress_state.start_time > BAR_DELAY:
@@ -176,5 +181,5 @@ def _draw_bar(progress_state: ProgressState, finished: threading.Event) -> None:
             text, share, left = progress_state.state()
             total = None if share is None else 1.0
             bar.update(task, description=text, total=total, completed=share or 0.0, left=left)
-            if finished.wait(BAR_PERIOD):
+            if finished_event.wait(BAR_PERIOD):
                 return

@@ -21,11 +21,11 @@ class HardCase:
     ----------
     difficulty, exact_answer : why the case is hard, and the invariant or exact answer, as phrases
     unit, tolerance, tolerance_reason : unit and tolerance of the error, and the reason for the tolerance
-    error : function of the implementation and a folder for input files that returns the error
-    expected : outcomes other than "right", by implementation
-    naive : function that returns, as a phrase, what code without the guard or rule does; None if there is no such test
+    error_function : function of the implementation and a folder for input files that returns the error
+    expected_outcomes : outcomes other than "right", by implementation
+    naive_result : function that returns, as a phrase, what code without the guard or rule does; None if there is no such test
     answer_independence : how independent the exact answer is of the implementations
-    without_engine : whether no implementation takes part, so that the case is judged only once
+    is_without_engine : whether no implementation takes part, so that the case is judged only once
     """
 
     name: str
