@@ -176,7 +176,7 @@ def compare(first: "Result | str | Path", second: "Result | str | Path", shift: 
         laid = overlay_of_run(_loaded_result(first), second, shift)
         values = {
             "shift": laid.shift.seconds,
-            "channels": {compared.name: compared.values() for compared in laid.matches},
+            "channels": {compared.name: compared.errors_for_json() for compared in laid.matches},
         }
         return Report((f"{second} over {_result_name(first, 'the run')}", *laid.lines()), values, laid)
     if shift is not None:

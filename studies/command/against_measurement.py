@@ -40,14 +40,14 @@ class ChannelComparison:
     name: str
     unit: str
     times: np.ndarray
-    run: np.ndarray
-    measured: np.ndarray
+    run_values: np.ndarray
+    measured_values: np.ndarray
     stated: float
 
     @property
     def error(self) -> np.ndarray:
         """Error (n,) of the channel: value of the run minus measured value."""
-        return self.run - self.measured
+        return self.run_values - self.measured_values
 
     @property
     def rms(self) -> float:
@@ -57,25 +57,25 @@ class ChannelComparison:
     @property
     def relative(self) -> float:
         """Rms error divided by the standard deviation of the measurement; infinite if the measurement is constant."""
-        size = float(np.std(self.measured))
+        size = float(np.std(self.measured_values))
         return self.rms / size if size > 0.0 else (0.0 if self.rms == 0.0 else np.inf)
 
     @property
-    def row(self) -> int:
+    def row_of_peak(self) -> int:
         """Index of the sample at which the channel's error is largest."""
         return int(np.abs(self.error).argmax())
 
     @property
     def peak(self) -> float:
         """Error of the largest magnitude, with its sign."""
-        return float(self.error[self.row])
+        return float(self.error[self.row_of_peak])
 
     @property
     def time_of_peak(self) -> float:
         """Time (s) of the run at which the channel's error is largest."""
-        return float(self.times[self.row])
+        return float(self.times[self.row_of_peak])
 
-    def values(self) -> dict[str, float | None]:
+    def errors_for_json(self) -> dict[str, float | None]:
         """Errors of the channel as plain values for JSON; None for numbers that are not finite."""
         plain = {
             "rms": self.rms,
@@ -156,7 +156,7 @@ def overlay_of_run(
     timed = (
         (name, quantity)
         for name, quantity in channels_of(saved_run.data)
-        if quantity.over == TIME_AXIS and len(quantity.grid) > 3
+        if quantity.grid_name == TIME_AXIS and len(quantity.grid) > 3
     )
     ours = {name: quantity for name, quantity in timed if np.isfinite(quantity.values).all()}
     if not ours:
@@ -298,7 +298,7 @@ def report(
         "failed": {},
         "shift": {name: overlay.shift.seconds for name, overlay in overlays.items()},
         "errors of channels": {
-            name: {m.name: m.values() for m in overlay.matches} for name, overlay in overlays.items()
+            name: {m.name: m.errors_for_json() for m in overlay.matches} for name, overlay in overlays.items()
         },
         "table": table,
         "results": {},
@@ -318,8 +318,8 @@ def draw_overlay(measurement_overlay: MeasurementOverlay, title: str, figure_pat
     figure, axes = subplots(2, len(shown), figsize=(3.6 * len(shown) + 1.0, 5.4), sharex="col", squeeze=False)
     for (top, error_axis), match in zip(axes.T, shown, strict=True):
         unit = match.unit or "-"
-        top.plot(match.times, match.measured, color=DARK, linewidth=1.8, label="measured")
-        top.plot(match.times, match.run, color=VERMILION, linewidth=1.0, label="run")
+        top.plot(match.times, match.measured_values, color=DARK, linewidth=1.8, label="measured")
+        top.plot(match.times, match.run_values, color=VERMILION, linewidth=1.0, label="run")
         top.set(title=match.name, ylabel=f"{match.name} [{unit}]")
         error_axis.plot(match.times, match.error, color=BLUE)
         error_axis.plot(match.time_of_peak, match.peak, "o", color=BLUE, markersize=5)

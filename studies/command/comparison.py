@@ -154,7 +154,7 @@ def _with_errors(
     errors = {} if saved_run is None else errors_of(saved_run)
     for name, quantity in quantities:
         stated = errors.get(name.partition(", ")[0])
-        yield name, quantity if stated is None else replace(quantity, error=stated.error)
+        yield name, quantity if stated is None else replace(quantity, stated_error=stated.error)
 
 
 def channels_of(dataset: Any) -> Iterator[tuple[str, ResultQuantity]]:
@@ -213,7 +213,7 @@ def _quantities_of_table(table_path: Path) -> Iterator[tuple[str, ResultQuantity
     grid = numeric.pop(axis_name, np.arange(len(rows), dtype=float))
     for head, values in numeric.items():
         name, _, unit = head.partition(" [")
-        yield name, ResultQuantity(unit.rstrip("]"), values, axis_name, grid, labels=labels)
+        yield name, ResultQuantity(unit.rstrip("]"), values, axis_name, grid, row_labels=labels)
 
 
 def _numeric_cells(column_cells: tuple[str, ...]) -> np.ndarray | None:
@@ -228,21 +228,21 @@ def _quantity_difference(
     quantity_name: str, first_quantity: ResultQuantity, second_quantity: ResultQuantity, file_name: object
 ) -> QuantityDifference:
     """Difference of a quantity in two results; raises InputError if kinds, units or rows do not match."""
-    if first_quantity.kind != second_quantity.kind:
+    if first_quantity.run_kind != second_quantity.run_kind:
         raise InputError(
             file_name,
             quantity_name,
-            second_quantity.kind,
-            f"the other run is of {first_quantity.kind}: compare two runs of one kind",
+            second_quantity.run_kind,
+            f"the other run is of {first_quantity.run_kind}: compare two runs of one kind",
         )
-    if (first_quantity.unit, first_quantity.over) != (second_quantity.unit, second_quantity.over):
+    if (first_quantity.unit, first_quantity.grid_name) != (second_quantity.unit, second_quantity.grid_name):
         raise InputError(
             file_name,
             quantity_name,
-            f"{second_quantity.unit} over {second_quantity.over}",
-            f"the other one is in {first_quantity.unit} over {first_quantity.over}",
+            f"{second_quantity.unit} over {second_quantity.grid_name}",
+            f"the other one is in {first_quantity.unit} over {first_quantity.grid_name}",
         )
-    for label, other in zip(first_quantity.labels, second_quantity.labels, strict=False):
+    for label, other in zip(first_quantity.row_labels, second_quantity.row_labels, strict=False):
         if label != other:
             raise InputError(
                 file_name, quantity_name, other, f"has other rows than the first, which has {label!r} there"
@@ -254,22 +254,25 @@ def _quantity_difference(
         return QuantityDifference(
             quantity_name,
             first_quantity.unit,
-            first_quantity.over,
+            first_quantity.grid_name,
             first_quantity.grid,
             first_quantity.values,
             second_quantity.values,
             "",
-            first_quantity.labels,
-            first_quantity.error + second_quantity.error,
+            first_quantity.row_labels,
+            first_quantity.stated_error + second_quantity.stated_error,
         )
-    if first_quantity.over != "time [s]":
+    if first_quantity.grid_name != "time [s]":
         rows = (
             ""
             if len(first_quantity.grid) == len(second_quantity.grid)
             else f", {len(second_quantity.grid)} instead of {len(first_quantity.grid)}"
         )
         raise InputError(
-            file_name, quantity_name, None, f"has rows at other places ({first_quantity.over}) than the first{rows}"
+            file_name,
+            quantity_name,
+            None,
+            f"has rows at other places ({first_quantity.grid_name}) than the first{rows}",
         )
     return _difference_in_time(quantity_name, first_quantity, second_quantity, file_name)
 
@@ -302,11 +305,11 @@ def _difference_in_time(
     return QuantityDifference(
         quantity_name,
         first_quantity.unit,
-        first_quantity.over,
+        first_quantity.grid_name,
         common_times,
         *values_of_both,
         note,
-        stated=first_quantity.error + second_quantity.error,
+        stated=first_quantity.stated_error + second_quantity.stated_error,
     )
 
 
@@ -355,7 +358,10 @@ def comparison_lines(differences: list[QuantityDifference], notes: list[str]) ->
 
 def _file_lines(differences: list[QuantityDifference]) -> list[str]:
     differ = [difference for difference in differences if difference.largest > 0.0]
-    notes = [f"  {note}" for note in dict.fromkeys(difference.note for difference in differences if difference.note)]
+    notes = [
+        f"  {note}"
+        for note in dict.fromkeys(difference.rows_note for difference in differences if difference.rows_note)
+    ]
     if not differ:
         return [f"  all {len(differences)} quantities are the same to the last bit", *notes]
     shown = [difference for difference in differences[:PRINTED_QUANTITIES] if difference.largest > 0.0]
@@ -408,17 +414,23 @@ def _figure(
     share = 0.95 * COLUMN_WIDTH / len(shown) - 0.3
     figure, axes = subplots(2 if differ else 1, len(shown), figsize=(COLUMN_WIDTH, 4.8), sharex="col", squeeze=False)
     for top, difference in zip(axes[0], shown, strict=True):
-        top.plot(difference.grid, difference.first, color=DARK, linewidth=2.0, label=str(first_path))
-        top.plot(difference.grid, difference.second, color=VERMILION, linewidth=1.0, label=str(second_path))
+        top.plot(difference.grid, difference.first_values, color=DARK, linewidth=2.0, label=str(first_path))
+        top.plot(difference.grid, difference.second_values, color=VERMILION, linewidth=1.0, label=str(second_path))
         top.set_title(wrapped_text(f"{difference.name} [{difference.unit or '-'}]", share, TITLE_TEXT))
     for error_axis, difference in zip(axes[-1], differ, strict=False):
-        error_axis.plot(difference.grid, np.where(np.isfinite(difference.gap), difference.gap, np.nan), color=BLUE)
-        error_axis.plot(difference.at, difference.gap[difference.row], "o", color=BLUE, markersize=5)
+        error_axis.plot(
+            difference.grid,
+            np.where(np.isfinite(difference.difference_values), difference.difference_values, np.nan),
+            color=BLUE,
+        )
+        error_axis.plot(
+            difference.at, difference.difference_values[difference.row_of_largest], "o", color=BLUE, markersize=5
+        )
         error = ", rms within the stated error" if difference.within else ""
         panel_title = f"difference [{difference.unit or '-'}], largest {difference.largest:.3g} at the mark{error}"
         error_axis.set_title(wrapped_text(panel_title, share, TITLE_TEXT))
     for lowest, difference in zip(axes[-1], shown, strict=True):
-        lowest.set_xlabel(difference.over)
+        lowest.set_xlabel(difference.grid_name)
     legend_below(figure, axes[0, 0], columns=1)
     add_heading(figure, f"Largest differences of {len(differences)} quantities", shown_results)
     save(figure, figure_path)

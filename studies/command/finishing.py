@@ -44,8 +44,8 @@ def finish(
 ) -> None:
     """Run a study, whose results are saved in ``output_folder``, with a progress bar, and print its summary.
 
-    doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results; is_strict : whether
-    a broken assumption ends with code 1; system_name : of the scene.
+    doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results; is_strict :
+    whether a broken assumption ends with code 1; system_name : of the scene.
     """
     from models.core.result_folders import COMMAND_FILE, drop_if_empty
     from models.core.told import summary_with_errors

@@ -40,8 +40,8 @@ def identify(
     """Estimates of a scene's keys from a measurement, with their uncertainty; the run must have channels over time.
 
     scene : as ``load_scene`` gives it; measurement_path : its channels have the names of the run's; scene_keys : KEY or
-    KEY=LOW:HIGH; engine : "" for the usual one; low_pass : Hz, on both, 0 for none; stages_folder : keeps finished stages.
-    The scene's crew computes the columns of Jacobians. Raises InputError and RunFailed.
+    KEY=LOW:HIGH; engine : "" for the usual one; low_pass : Hz, on both, 0 for none; stages_folder : keeps finished
+    stages. The scene's crew computes the columns of Jacobians. Raises InputError and RunFailed.
     """
     problem = problem_of(scene, measurement_path, scene_keys, engine, low_pass)
     with Crew.of(scene, default_workers=1).at_work(1 + len(problem.parameters), *folders_for_workers(scene)) as pool:

@@ -23,7 +23,7 @@ class HardCase:
     unit, tolerance, tolerance_reason : unit and tolerance of the error, and the reason for the tolerance
     error_function : function of the implementation and a folder for input files that returns the error
     expected_outcomes : outcomes other than "right", by implementation
-    naive_result : function that returns, as a phrase, what code without the guard or rule does; None if there is no such test
+    naive_result : function that returns, as a phrase, what code without the guard or rule does; None if there is none
     answer_independence : how independent the exact answer is of the implementations
     is_without_engine : whether no implementation takes part, so that the case is judged only once
     """
