@@ -45,12 +45,12 @@ def run(
             e: r if len(r.times) == step else r.every(float(r.times[-1]) / (step - 1)) for e, r in runs.items()
         }
         join_results(decimated, "engine").save(output_folder / "runs.nc")
-        figure(scene, speeds, values, runs, output_folder / "bicycle.png")
+        eigenvalue_and_motion_figure(scene, speeds, values, runs, output_folder / "bicycle.png")
     return {
         "scene": scene.title,
         "folder": str(output_folder),
         "failed": failed,
-        "answer": _figures_of_runs(scene, runs),
+        "answer": _key_figures_of_runs(scene, runs),
         "results": runs,
         "table": [_run_line(engine, result) for engine, result in runs.items()],
     }
@@ -62,7 +62,7 @@ def eigenvalues(scene: BicycleScene) -> tuple[np.ndarray, np.ndarray]:
     return speeds, np.array([scene.whipple.eigenvalues(float(speed), scene.control) for speed in speeds])
 
 
-def _figures_of_runs(scene: BicycleScene, runs_by_engine: dict[str, Result]) -> dict[str, Any]:
+def _key_figures_of_runs(scene: BicycleScene, runs_by_engine: dict[str, Result]) -> dict[str, Any]:
     bicycle = scene.whipple
     figures: dict[str, Any] = {
         "weave speed without control [m/s]": bicycle.weave_speed,
@@ -80,7 +80,7 @@ def _run_line(engine: str, engine_run: Result) -> str:
     return f"    {engine:<12}largest lean {lean:.5f} rad, steer {steer:.5f} rad; energy unaccounted for {gap:.1e}"
 
 
-def figure(
+def eigenvalue_and_motion_figure(
     scene: BicycleScene,
     speeds: np.ndarray,
     eigenvalues_over_speed: np.ndarray,

@@ -78,7 +78,7 @@ def run(
             **train,
         }
         table += (
-            figures_lines(name, stop, figures, wheels)
+            figures_of_merit_lines(name, stop, figures, wheels)
             + remarks
             + measurement_end_line(measured, stop)
             + comparison_lines(results)
@@ -120,7 +120,7 @@ def comparison_lines(results_by_engine: dict[str, Result]) -> list[str]:
     return rows
 
 
-def figures_lines(
+def figures_of_merit_lines(
     procedure_name: str, stop: Stop, vehicle_figures: dict[str, float], wheel_figures: dict[str, np.ndarray]
 ) -> list[str]:
     """Lines for the screen on one procedure: a table of figures for the vehicle, and a table with a column per

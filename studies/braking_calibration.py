@@ -110,7 +110,7 @@ def run(
         "folder": str(output_folder),
         "failed": {},
         "results": {"rounds": by_rounds, "as fitted": stop},
-        "table": table(options, scale, steer, scatters),
+        "table": calibration_lines(options, scale, steer, scatters),
         "answer": {"scale": scale, "steer": steer, **{key: figure.mean for key, figure in scatters.items()}},
     }
 
@@ -146,7 +146,7 @@ def _means_of_stops(
     return {key: scatter_of(stops[key]) for key in PAPER_VALUES}
 
 
-def table(
+def calibration_lines(
     study_options: Options, friction_scale: float, steer_angle: float, scatter_by_figure: dict[str, Scatter]
 ) -> list[str]:
     """Lines for the screen: the fitted parameters, and each figure beside the paper's values."""

@@ -62,7 +62,7 @@ def scene_of_each_run(scene: BrakingScene) -> dict[tuple[str, str, str], Braking
     options = read(Options, scene.options, scene.file, "options")
     trains = [scene] if scene.trailer is None else [scene.model_copy(update={"trailer": None}), scene]
     return {
-        (surface, name, controller + " + trailer" * (train.trailer is not None)): _single_procedure(
+        (surface, name, controller + " + trailer" * (train.trailer is not None)): _single_procedure_scene(
             train, surface, right, name, table
         )
         for surface, right in options.surfaces.items()
@@ -72,7 +72,7 @@ def scene_of_each_run(scene: BrakingScene) -> dict[tuple[str, str, str], Braking
     }
 
 
-def _single_procedure(
+def _single_procedure_scene(
     scene: BrakingScene, surface: str, right_surface: str, procedure_name: str, controller: ControllerTable
 ) -> BrakingScene:
     """The scene reduced to one procedure on one surface with one controller; right_surface : of the right track in
@@ -122,11 +122,15 @@ def run(
         )
     _save_stops(scene, answer, output_folder, results)
     _figure(scene, answer, output_folder / "controllers.png", results)
-    summary = {"results": results, "answer": answer, "table": table(answer) + [ESTIMATED_SPEED_NOTE] * estimated}
+    summary = {
+        "results": results,
+        "answer": answer,
+        "table": stop_table_lines(answer) + [ESTIMATED_SPEED_NOTE] * estimated,
+    }
     return {"scene": scene.title, "folder": str(output_folder), "failed": failed, **summary}
 
 
-def table(stop_rows: list[dict[str, Any]]) -> list[str]:
+def stop_table_lines(stop_rows: list[dict[str, Any]]) -> list[str]:
     """Lines for the screen: a table of the stops with a line per run."""
     heads = [*SHOWN_QUANTITIES, LOCKED_COLUMN]
     lines = [f"  {'surface':<10}{'procedure':<12}{'controller':<32}" + "".join(f"{head:>17}" for head in heads)]
@@ -162,7 +166,7 @@ PANEL_TITLES = {"v0^2/2d [m/s^2]": "equivalent deceleration [m/s²]", "yaw [deg]
 def _figure(scene: BrakingScene, stop_rows: list[dict[str, Any]], figure_path: Path, shown_results: Results) -> None:
     """Save a bar chart of the stops by procedure, with a column of panels per surface and a colour per controller."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, save, subplots
-    from studies.braking_figures import plain_name
+    from studies.braking_figures import readable_name
 
     options = read(Options, scene.options, scene.file, "options")
     surfaces, _, kinds = (list(dict.fromkeys(stop[name] for stop in stop_rows)) for name in LABEL_COLUMNS)
@@ -185,11 +189,11 @@ def _figure(scene: BrakingScene, stop_rows: list[dict[str, Any]], figure_path: P
                     np.arange(len(names)) + (k - (len(kinds) - 1) / 2) * width,
                     heights,
                     width * 0.95,
-                    label=" + ".join(map(plain_name, kind.split(" + "))),
+                    label=" + ".join(map(readable_name, kind.split(" + "))),
                     color=f"C{k % controllers_per_group}",
                     alpha=1.0 if k < controllers_per_group else 0.5,
                 )
-            axis.set_xticks(range(len(names)), [plain_name(name).replace(" ", "\n") for name in names])
+            axis.set_xticks(range(len(names)), [readable_name(name).replace(" ", "\n") for name in names])
             axis.set(
                 title=f"{surface.capitalize()}; split: {options.surfaces[surface]} right" if row == 0 else "",
                 ylabel=quantity if column == 0 else "",

@@ -31,7 +31,7 @@ from models.systems.braking.stop_report import SLOWEST_SLIP_SPEED, Stop, wheel_n
 
 WHEEL_COLOURS = (BLUE, SKY, VERMILION, ORANGE, GREEN, "#66c2a5", PINK, "#e7b5d1")
 GROUND_COLOURS = {"dry": "#9a9a9a", "wet": "#7f9bb3", "snow": "#eceff1", "ice": "#cfe8f3"}
-OTHER_SURFACE = "#e8dcc8"
+OTHER_SURFACE_COLOUR = "#e8dcc8"
 """Colour of a road surface that the user defined."""
 OUTLINE_OVERHANG, HALF_WIDTH = 1.2, 1.1
 """Length (m) of a vehicle's drawn outline beyond its axles, which is chosen, and half of its width (m)."""
@@ -62,7 +62,7 @@ def stop_figure(
         axes["across"].plot(stop.times[1:], stop.lateral_acceleration, color=DARK, lw=0.8)
         axes["across"].set(xlabel="time [s]", ylabel="acceleration [m/s²]", title="Lateral acceleration")
     if lean is not None:
-        _plot_lean(axes["lean"], stop.times, lean)
+        _plot_roll_and_pitch(axes["lean"], stop.times, lean)
         _plot_wheel_curves(
             axes["loads"], stop.times[1:], stop.path.reports.load / 1e3, "Load of each wheel", "load [kN]"
         )
@@ -77,7 +77,7 @@ def stop_figure(
     controller = controller_text(scene).replace("{procedure}", procedure_name)
     add_heading(
         figure,
-        f"{scene.title}: {plain_name(procedure_name)} from {procedure.speed:g} m/s, "
+        f"{scene.title}: {readable_name(procedure_name)} from {procedure.speed:g} m/s, "
         f"{READER_SPELLINGS.get(controller, controller)}; {ended}",
         results_by_engine,
     )
@@ -93,12 +93,12 @@ READER_SPELLINGS = {
 """Spellings of procedures and controllers for readers."""
 
 
-def plain_name(raw_name: str) -> str:
+def readable_name(raw_name: str) -> str:
     """Name of a procedure or controller for titles and labels, in its usual spelling or with spaces."""
     return READER_SPELLINGS.get(raw_name, raw_name.replace("_", " "))
 
 
-STRAIGHT_LIMIT = 0.05
+LATERAL_MOTION_LIMIT = 0.05
 """Angle (degrees) and lateral acceleration (m/s^2) up to which a stop is straight and lateral motion is not drawn."""
 
 
@@ -106,7 +106,7 @@ def _moves_laterally(stop: Stop) -> bool:
     """Whether yaw, side slip or lateral acceleration during the stop is large enough to be drawn."""
     moving = stop.speed > SLOWEST_SLIP_SPEED
     sideways = np.degrees(stop.path.states[:, 0, 2]), np.degrees(stop.side_slip[moving]), stop.lateral_acceleration
-    return any(np.abs(values).max(initial=0.0) > STRAIGHT_LIMIT for values in sideways)
+    return any(np.abs(values).max(initial=0.0) > LATERAL_MOTION_LIMIT for values in sideways)
 
 
 def _plot_speeds(axis: Axes, stop: Stop, rim_speeds: np.ndarray, measured_pressures: MeasuredPressures | None) -> None:
@@ -134,7 +134,7 @@ def _plot_wheel_curves(
     axis.set(xlabel="time [s]", ylabel=axis_label, title=title)
 
 
-def _plot_lean(axis: Axes, times: np.ndarray, roll_and_pitch: np.ndarray) -> None:
+def _plot_roll_and_pitch(axis: Axes, times: np.ndarray, roll_and_pitch: np.ndarray) -> None:
     """Plot roll and pitch of the body (n, 2) in rad over times (n,) in s."""
     for values, colour, label in zip(
         np.degrees(roll_and_pitch).T, WHEEL_COLOURS[::2], ("roll, to the right", "pitch, nose down"), strict=False
@@ -215,7 +215,7 @@ def draw_path_from_above(axis: Axes, scene: BrakingScene, procedure_name: str, s
                 [max(begin, first), min(end, largest_x)],
                 bottom,
                 top,
-                color=GROUND_COLOURS.get(surface, OTHER_SURFACE),
+                color=GROUND_COLOURS.get(surface, OTHER_SURFACE_COLOUR),
                 lw=0,
                 label=None if surface in surfaces_named else surface,
             )

@@ -23,14 +23,14 @@ from models.core.errors import InputError
 from models.core.result import Result
 from models.core.strict import Strict, read
 from models.ensemble.workers import Crew, folders_for_workers
-from studies.command.asked import ANY_SYSTEM, load_scene, plan_of
+from studies.command.asked import ANY_SYSTEM, load_scene, plan_module_of
 
 SYSTEM = ANY_SYSTEM
 ACTIVE_SHARE, BLIND_CHANGE = 0.1, 1e-3
 """Share of the energy activity above which an element is active; relative change below which a quantity ignores it."""
 LOWEST_CHANGE, HIGHEST_CHANGE = 1e-3, 1e3
 """Ends of the axis of changes (per cent); smaller or larger changes are drawn at the ends."""
-ELEMENTS_DRAWN = 8
+DRAWN_ELEMENT_LIMIT = 8
 """Largest number of elements whose energy activity is drawn, the most active first."""
 ReportProgress = Callable[[str, float], None]
 
@@ -43,12 +43,12 @@ class Options(Strict):
 
 @dataclass(frozen=True)
 class SingleEffect:
-    """A single effect of a scene. changes (quantities,) : predicted relative changes if only this effect is left out,
-    inf if it cannot be; work_ratio : work of the complete scene, at the steps that accuracy allows, divided by the work
-    without the effect at the longest step then allowed."""
+    """A single effect of a scene. predicted_changes (quantities,) : predicted relative changes if only this effect is
+    left out, inf if it cannot be; work_ratio : work of the complete scene, at the steps that accuracy allows, divided
+    by the work without the effect at the longest step then allowed."""
 
     effect: str
-    changes: np.ndarray
+    predicted_changes: np.ndarray
     work_ratio: float
 
 
@@ -96,7 +96,9 @@ def save_choices(
     for i, chosen_scene in enumerate(scenes):
         report_progress(chosen_scene.title, i / len(scenes))
         linear, engines_asked = has_closed_form(chosen_scene), engines if chosen_scene is scene else ()
-        plan_of(chosen_scene).check(chosen_scene, () if linear else (engine_for_choice(chosen_scene, engines_asked),))
+        plan_module_of(chosen_scene).check(
+            chosen_scene, () if linear else (engine_for_choice(chosen_scene, engines_asked),)
+        )
         report_share = partial(
             _pass_progress, report_progress, f"{chosen_scene.title}, of at most {RUN_BUDGET} runs", i, len(scenes)
         )
@@ -155,7 +157,7 @@ def engine_for_choice(scene: Any, engines: tuple[str, ...]) -> str:
     return usual if not engines or usual in engines else engines[0]
 
 
-def search_text(scene: Any) -> str:
+def search_effort_text(scene: Any) -> str:
     """Line for the screen on the number of runs that the search for a scene's choice of effects may take."""
     if has_closed_form(scene):
         from models.advice.ride_choice.estimate import estimate
@@ -276,7 +278,7 @@ def _save_effect_table(scene_choice: SceneEffectChoice, table_path: Path) -> Non
         heads = [f"{name}, change [-]" for name in scene_choice.scene.quantities]
         writer.writerow(["effect", "left out", *heads, "times less work alone [-]", "would break"])
         for effect in scene_choice.single_effects:
-            values = map(repr, effect.changes.tolist())
+            values = map(repr, effect.predicted_changes.tolist())
             broken = "; ".join(breach.says for breach in scene_choice.choice.assumptions_barring.get(effect.effect, ()))
             writer.writerow(
                 [effect.effect, effect.effect in scene_choice.choice.left_out, *values, repr(effect.work_ratio), broken]
@@ -293,7 +295,7 @@ def _change_text(relative_change: float, uncertainty: float) -> str:
     return percent_text(relative_change) + (f" +- {percent_text(uncertainty)}" if uncertainty else "")
 
 
-def _why_it_stays(relative_change: float, scene_choice: SceneEffectChoice) -> str:
+def _reason_to_stay_text(relative_change: float, scene_choice: SceneEffectChoice) -> str:
     """Text on why an effect stays: how much the quantities would change if it were left out, too."""
     if (
         relative_change > PREDICTION_SHARE * scene_choice.scene.tolerance
@@ -333,7 +335,7 @@ def choice_lines(scene_choice: SceneEffectChoice, with_title: bool) -> list[str]
             f"longer steps with all effects; CPU seconds {faster:.3g} times fewer, once"
         )
     rows += [
-        f"    {name} {_why_it_stays(change, scene_choice)}"
+        f"    {name} {_reason_to_stay_text(change, scene_choice)}"
         for name, change in sorted(scene_choice.further_tolerances.items(), key=lambda item: item[1])
     ]
     rows += [
@@ -347,18 +349,18 @@ def choice_lines(scene_choice: SceneEffectChoice, with_title: bool) -> list[str]
         rows.append(
             f"    chance alone stands in the way of more: {choice.sample_factor:.2g} times as many samples would tell"
         )
-    rows += misleading_activities(scene_choice)
+    rows += misleading_activity_lines(scene_choice)
     worst = float((choice.confirmed_change + choice.statistical_error).max())
     return [*rows, f"    the choice holds for tolerances down to {percent_text(worst)}"] if choice.left_out else rows
 
 
-def misleading_activities(scene_choice: SceneEffectChoice) -> list[str]:
+def misleading_activity_lines(scene_choice: SceneEffectChoice) -> list[str]:
     """Lines for the screen on inertias for which energy activity misleads: active ones without which a quantity hardly
     changes."""
     total, rows = sum(value for value in scene_choice.activity_of_element.values() if np.isfinite(value)), []
     for effect in scene_choice.single_effects:
         share = scene_choice.activity_of_element.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
-        for name, change in zip(scene_choice.scene.quantities, effect.changes, strict=True):
+        for name, change in zip(scene_choice.scene.quantities, effect.predicted_changes, strict=True):
             if np.isfinite(share) and share > ACTIVE_SHARE and change < BLIND_CHANGE:
                 rows.append(
                     f"    energy activity misleads: {effect.effect} holds {percent_text(share)} of it, and without "
@@ -375,7 +377,7 @@ def choice_figure(scene_choices: list[SceneEffectChoice], figure_path: Path) -> 
         (choice, True) for choice in scene_choices if choice.activity_of_element
     ]
     heights = [
-        1.5 + 0.2 * (ELEMENTS_DRAWN if active else max(len(choice.single_effects), 4)) for choice, active in shown
+        1.5 + 0.2 * (DRAWN_ELEMENT_LIMIT if active else max(len(choice.single_effects), 4)) for choice, active in shown
     ]
     figure, axes = subplots(
         len(shown), 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.5), squeeze=False, height_ratios=heights
@@ -396,11 +398,11 @@ def _plot_changes(axis: Any, scene_choice: SceneEffectChoice) -> None:
 
     shown = sorted(
         scene_choice.single_effects,
-        key=lambda effect: float(np.nan_to_num(effect.changes, posinf=HIGHEST_CHANGE).max()),
+        key=lambda effect: float(np.nan_to_num(effect.predicted_changes, posinf=HIGHEST_CHANGE).max()),
     )
     y = np.arange(len(shown))
     for i, name in enumerate(scene_choice.scene.quantities):
-        values = np.array([effect.changes[i] for effect in shown])
+        values = np.array([effect.predicted_changes[i] for effect in shown])
         axis.plot(
             np.clip(np.where(np.isfinite(values), 100 * values, np.nan), LOWEST_CHANGE, HIGHEST_CHANGE),
             y,
@@ -410,7 +412,7 @@ def _plot_changes(axis: Any, scene_choice: SceneEffectChoice) -> None:
             label=name.partition(" [")[0],
         )
     for row, effect in zip(y, shown, strict=True):
-        if not np.isfinite(effect.changes).all():
+        if not np.isfinite(effect.predicted_changes).all():
             axis.text(HIGHEST_CHANGE, row, "cannot go alone", ha="right", va="center", fontsize=SMALL_TEXT)
     barred = [
         row for row, effect in zip(y, shown, strict=True) if effect.effect in scene_choice.choice.assumptions_barring
@@ -451,7 +453,7 @@ def _plot_activity(axis: Any, scene_choice: SceneEffectChoice) -> None:
 
     finite = {name: value for name, value in scene_choice.activity_of_element.items() if np.isfinite(value)}
     total = sum(finite.values())
-    shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS_DRAWN][::-1]
+    shown = sorted(finite.items(), key=lambda item: -item[1])[:DRAWN_ELEMENT_LIMIT][::-1]
     axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color=BLUE, alpha=0.7)
     axis.set(
         title=f"{scene_choice.scene.system}: energy activity, which knows neither the question nor pairs",

@@ -21,7 +21,7 @@ from models.systems.contact.scene import ContactScene, Method
 
 SYSTEM = "contact"
 ReportProgress = Callable[[str, float], None]
-PRINTED_ROWS = 12
+PRINTED_ROW_LIMIT = 12
 """Approximate number of rows of a sweep that are printed; the saved file has all."""
 
 
@@ -85,19 +85,19 @@ def _table_lines(scene: ContactScene, creep_forces: Result) -> list[str]:
         + "   errors: of cells, of theory [% of mu N], of Mz [N m]"
         * bool(rolls.errors),
     ]
-    step = max(1, (len(rolls.motions) - 1) // PRINTED_ROWS)
+    step = max(1, (len(rolls.motions) - 1) // PRINTED_ROW_LIMIT)
     errors: Sequence[Error | None] = rolls.errors or [None] * len(rolls.motions)
     for motion, force, error in list(zip(rolls.motions, rolls.rolled, errors, strict=True))[::step]:
         lines.append(
             f"    {motion[0]:>10.3g}{motion[1]:>10.3g}{motion[2]:>11.3g}{round(force.fx):>10,}"
             f"{round(force.fy):>10,}{force.mz:>10.3f}{force.stick:>7.0%}{force.dissipation:>10.3g}"
-            + ("" if error is None else _errors_text(error, limit))
+            + ("" if error is None else _force_errors_text(error, limit))
         )
     loss = "  loss: power by the rolling speed"
     return [*lines, loss + "; errors are of the force, that of Mz has both together" * bool(rolls.errors)]
 
 
-def _errors_text(force_error: Error, friction_limit_force: float) -> str:
+def _force_errors_text(force_error: Error, friction_limit_force: float) -> str:
     cells, theory = (
         _percent_text(error_part, friction_limit_force) for error_part in (force_error.cells, force_error.theory)
     )
@@ -135,7 +135,7 @@ def _contact_point_lines(scene: ContactScene) -> list[str]:
 
 
 def _draw_figures(scene: ContactScene, creep_forces: Result, output_folder: Path) -> None:
-    from studies.contact_figures import contact_figure, sweep_figure
+    from studies.contact_figures import contact_figure, creepage_sweep_figure
 
     rolls: ContactResults = creep_forces.detail
     motion, last_rolled, sweep = rolls.motions[-1], rolls.rolled[-1], scene.sweep
@@ -162,7 +162,9 @@ def _draw_figures(scene: ContactScene, creep_forces: Result, output_folder: Path
             if value and name != sweep.of
         )
         title = f"{scene.title}\nForces by {theory_text(scene.method)}{note_on_others}"
-        sweep_figure(sweep, creep_forces, _exact_checks(scene, rolls), title, output_folder / "forces.png")
+        creepage_sweep_figure(
+            sweep, creep_forces, _exact_theory_results(scene, rolls), title, output_folder / "forces.png"
+        )
 
 
 CREEPAGE_SYMBOLS = (("ξx", ""), ("ξy", ""), ("spin", " 1/m"))
@@ -179,7 +181,7 @@ EXACT_THEORY_CELLS = 40
 """Number of cells along each axis of the exact theory that checks a sweep."""
 
 
-def _exact_checks(scene: ContactScene, contact_results: ContactResults) -> dict[int, Any]:
+def _exact_theory_results(scene: ContactScene, contact_results: ContactResults) -> dict[int, Any]:
     """Results of the exact theory at a few creepages of a sweep, by the number of the creepage. Empty if the contact is
     no Hertzian ellipse, is exact already, or has falling friction."""
     body, points = contact_results.contact, read(Options, scene.options, scene.file, "options").exact

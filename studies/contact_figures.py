@@ -104,7 +104,7 @@ def _draw_tractions(
     for f in contact_patches:
         colours = np.where(f.slips[f.inside], SLIP_COLOUR, STICK_COLOUR)
         axis.add_collection(PolyCollection(_cell_corners(f), facecolor=colours, edgecolor="face", linewidth=0.2))
-        x, y, px, py = _arrow_data(f, arrow_spacing / MILLIMETRES_PER_METRE)
+        x, y, px, py = _traction_arrows(f, arrow_spacing / MILLIMETRES_PER_METRE)
         arrows = axis.quiver(
             MILLIMETRES_PER_METRE * x, MILLIMETRES_PER_METRE * y, px, py, **scaled, width=0.004, color=DARK
         )
@@ -117,7 +117,7 @@ def _draw_tractions(
     axis.set_title("Traction on the wheel,\nand where it sticks and slips")
 
 
-def _arrow_data(fields_on_cells: Fields, arrow_spacing: float) -> Array:
+def _traction_arrows(fields_on_cells: Fields, arrow_spacing: float) -> Array:
     """Positions x, y (m) and tractions (Pa) of the arrows, (4, n), at evenly spaced points along some rows of cells,
     between which tractions are interpolated."""
     arrows, lines = list[Array](), fields_on_cells.y[:, 0]
@@ -142,7 +142,7 @@ CREEPAGE_LABELS = {"xi_x": "longitudinal creepage [%]", "xi_y": "lateral creepag
 FORCE_COLOURS = {"fx": BLUE, "fy": VERMILION, "mz": GREEN}
 
 
-def sweep_figure(
+def creepage_sweep_figure(
     creepage_sweep: Sweep, creep_forces: Result, exact_results: dict[int, Rolled], title: str, figure_path: Path
 ) -> None:
     """Save a figure of creep forces and moment over a creepage, with error bands and some results of the exact theory.
@@ -203,7 +203,7 @@ THEORY_STYLES = {
 }
 
 
-LARGEST_ERROR = 60.0
+LARGEST_DRAWN_ERROR = 60.0
 """Largest error (% of mu N) that the figure shows."""
 
 
@@ -233,7 +233,9 @@ def price_figure(price_result: Result, title: str) -> Figure:
             axis.axhline(100 * target, color=DARK, linewidth=0.6, linestyle=":")
     axes[0].set_yticks([0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50], ["0.1", "0.2", "0.5", "1", "2", "5", "10", "20", "50"])
     axes[0].yaxis.set_minor_locator(NullLocator())
-    axes[0].set(ylim=(0.1, LARGEST_ERROR), xlim=(30.0, None), ylabel="mean error of the tangential force [% of μN]")
+    axes[0].set(
+        ylim=(0.1, LARGEST_DRAWN_ERROR), xlim=(30.0, None), ylabel="mean error of the tangential force [% of μN]"
+    )
     legend_below(figure, axes[0])
     add_heading(figure, title, {"price": price_result})
     return figure
@@ -248,7 +250,7 @@ def _plot_theory(
     mean, largest_errors = (
         100 * np.array([getattr(point, key) for point in theory_points]) for key in ("mean", "quantile_95")
     )
-    label = theory_name if mean[0] < LARGEST_ERROR else f"{theory_name}: {mean[0]:.0f} %"
+    label = theory_name if mean[0] < LARGEST_DRAWN_ERROR else f"{theory_name}: {mean[0]:.0f} %"
     axis.plot(x_values, mean, color=colour, marker=marker, linewidth=1.3, markersize=4.5, label=label)
     if with_bar:
         axis.plot([x_values[-1]] * 2, [mean[-1], largest_errors[-1]], color=colour, linewidth=0.8)

@@ -40,7 +40,7 @@ ReportProgress = Callable[[str, float], None]
 BLOCKS_FOLDER = "blocks"
 """Name of the folder of finished blocks in the results' folder; a study with this constant can be resumed."""
 PITCH_QUANTILES = (0.05, 0.5, 0.95)
-HEAVE_STATE = 2
+HEAVE_STATE_INDEX = 2
 """Index of the heave in the state."""
 
 
@@ -115,7 +115,7 @@ def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_prog
     rows = _deviation_rows(options, row_times, statistics)
     channels, axes = _result_channels(row_times, statistics, options.saved)
     saved = result(noisy, channels, axes, engine="reference", threshold=options.threshold)
-    _with_errors(saved, first, rows, options, statistics).save(output_folder / "ensemble.nc")
+    _with_stated_errors(saved, first, rows, options, statistics).save(output_folder / "ensemble.nc")
     table = summary_lines(options, scene, rows, statistics, gaps)
     write_whole(output_folder / "table.txt", "\n".join(table) + "\n")
     results = {"measurement": measured, "all paths": saved}
@@ -161,7 +161,7 @@ def _result_channels(
     return channels, axes
 
 
-def _with_errors(
+def _with_stated_errors(
     ensemble_result: Result,
     first_path: Result,
     deviation_rows: list[dict[str, float]],
@@ -204,7 +204,7 @@ def _deviation_rows(
     names, rows = ("time", "pitch", "pitch error", "heave", "heave error"), []
     for time in study_options.times:
         row = round(time / study_options.rows)
-        pitch, heave = (path_statistics.moments.deviation(row, state) for state in (PITCH_STATE, HEAVE_STATE))
+        pitch, heave = (path_statistics.moments.deviation(row, state) for state in (PITCH_STATE, HEAVE_STATE_INDEX))
         figures = (float(times[row]), *pitch, *heave)
         rows.append(dict(zip(names, figures, strict=True)))
     return rows

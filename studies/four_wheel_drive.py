@@ -68,7 +68,7 @@ def measured_columns(car_drive: Drive) -> dict[str, tuple[str, np.ndarray]]:
     return {name: (unit, values[::stride]) for name, (unit, values) in plain.items()} | noisy
 
 
-def save(output_path: Path) -> None:
+def save_virtual_measurement(output_path: Path) -> None:
     """Write the virtual measurement to a CSV file, with six digits."""
     columns = measured_columns(simulated_drive())
     head = ",".join(f"{name} [{unit}]" for name, (unit, _) in columns.items())
@@ -77,4 +77,4 @@ def save(output_path: Path) -> None:
 
 
 if __name__ == "__main__":
-    save(Path(sys.argv[1]))
+    save_virtual_measurement(Path(sys.argv[1]))

@@ -37,7 +37,7 @@ def run(
             title = name.replace("_", " ").capitalize() if len(scene.manoeuvres) > 1 else scene.title
             manoeuvre_figure(runs, title, output_folder / f"{name}.png")
             results |= {f"{name}, {engine}": run for engine, run in runs.items()}
-            answer[name] = _figures_of_runs(runs)
+            answer[name] = _key_figures_of_runs(runs)
             lines.append(_manoeuvre_line(name, answer[name]))
     head = (
         f"    {'':<16}{'largest':>26}{'least':>12}{'friction':>10}{'engines':>10}\n"
@@ -53,7 +53,7 @@ def run(
     }
 
 
-def _figures_of_runs(runs_by_engine: dict[str, Result]) -> dict[str, float]:
+def _key_figures_of_runs(runs_by_engine: dict[str, Result]) -> dict[str, float]:
     first, *other_runs = runs_by_engine.values()
     drive = first.detail
     figures = {

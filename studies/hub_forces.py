@@ -31,7 +31,7 @@ def run(scene: HubScene, engines: tuple[str, ...], output_folder: Path, report_p
     from studies.hub_forces_figures import damage_figure, drift_figure
 
     comparison = compare(scene, engines, report_progress)
-    save(comparison, output_folder)
+    save_measurement_and_runs(comparison, output_folder)
     drift_figure(comparison, scene.title, output_folder / "drift.png")
     damage_figure(comparison, scene.title, output_folder / "damage.png")
     return {
@@ -76,7 +76,7 @@ def _table_lines(scene: HubScene, run_comparison: Comparison) -> list[str]:
     return lines
 
 
-def save(run_comparison: Comparison, output_folder: Path) -> None:
+def save_measurement_and_runs(run_comparison: Comparison, output_folder: Path) -> None:
     """Save the measurement as CSV files of a user, all runs as ``runs.nc``, and the motion of the chassis as
     ``runs.csv``."""
     measurement = run_comparison.measurement

@@ -112,8 +112,8 @@ def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_prog
         from models.drawing.figures import save
 
         results["units"] = _errors_of_grades(scene, paths, options, next(iter(curves.values())))
-        save(_figure_grades(rows, options, results), output_folder / "grades.png")
-        save(_figure_curve(next(iter(curves.values()))), output_folder / "damage_of_an_angle.png")
+        save(_grade_error_figure(rows, options, results), output_folder / "grades.png")
+        save(_damage_curve_figure(next(iter(curves.values()))), output_folder / "damage_of_an_angle.png")
     return {
         "scene": scene.title,
         "folder": str(output_folder),
@@ -250,7 +250,7 @@ def _percent_text(damage_error: float) -> str:
     return f"{100 * damage_error:.2g}" if damage_error < 1 else f"{100 * damage_error:,.0f}"
 
 
-def _figure_grades(grade_rows: list[dict[str, Any]], study_options: Options, shown_results: Results) -> Any:
+def _grade_error_figure(grade_rows: list[dict[str, Any]], study_options: Options, shown_results: Results) -> Any:
     """Figure of angle error and damage error over the duration of the drive, with a line for each gyro grade."""
     from models.drawing.figures import COLUMN_WIDTH, DARK, add_heading, legend_below, subplots
 
@@ -273,7 +273,7 @@ def _figure_grades(grade_rows: list[dict[str, Any]], study_options: Options, sho
     return figure
 
 
-def _figure_curve(damage_curve: CubicSpline) -> Any:
+def _damage_curve_figure(damage_curve: CubicSpline) -> Any:
     """Figure of the damage ratio of each section force over a constant pitch error."""
     from models.drawing.drift import CHANNEL_LABELS
     from models.drawing.figures import add_heading, subplots

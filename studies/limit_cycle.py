@@ -44,7 +44,7 @@ def run(
 
     The branch is a table (CSV) and a result (netCDF).
     """
-    from studies.wheelset_figures import branch_figure, cycle_figure
+    from studies.wheelset_figures import limit_cycle_branch_figure, limit_cycle_figure
 
     options = read(Options, scene.options, scene.file, "options")
     branched = branch_result(
@@ -60,9 +60,9 @@ def run(
     if orbits:
         branched.save(output_folder / "branch.nc")
         branched.save_table(output_folder / "branch.csv", *ORBIT_CHANNELS)
-        branch_figure(branched, wheelset_of(scene), scene.title, output_folder / "branch.png")
+        limit_cycle_branch_figure(branched, wheelset_of(scene), scene.title, output_folder / "branch.png")
     if by_engine:
-        cycle_figure(results, scene.title, output_folder / "cycle.png")
+        limit_cycle_figure(results, scene.title, output_folder / "cycle.png")
     else:
         notes.append(f"at {speed:g} m/s a motion from {1e3 * scene.run.displacement:g} mm dies out: no cycle")
     return {
@@ -70,9 +70,9 @@ def run(
         "folder": str(output_folder),
         "failed": failed,
         "answer": {
-            "branch": [_numbers_of_orbit(orbit, *ORBIT_CHANNELS) for orbit in orbits],
+            "branch": [_quantities_of_cycle(orbit, *ORBIT_CHANNELS) for orbit in orbits],
             "cycles": {
-                engine: _numbers_of_orbit(orbit, *(name for name in ORBIT_CHANNELS if name != "multiplier"))
+                engine: _quantities_of_cycle(orbit, *(name for name in ORBIT_CHANNELS if name != "multiplier"))
                 for engine, orbit in by_engine.items()
             },
         },
@@ -81,7 +81,7 @@ def run(
     }
 
 
-def _numbers_of_orbit(orbit: Orbit, *quantity_names: str) -> dict[str, float]:
+def _quantities_of_cycle(orbit: Orbit, *quantity_names: str) -> dict[str, float]:
     """Named quantities of a limit cycle as plain numbers in SI units."""
     return {name: float(getattr(orbit, name)) for name in quantity_names}
 

@@ -67,20 +67,22 @@ class ReadingsSource:
     """Accelerometer readings (n, sensors, 3) in m/s^2 of an engine's run or a file, ``period`` (s) apart, with the true
     motion and gyro readings if there are any."""
 
-    name: str
+    source_name: str
     readings: np.ndarray
-    period: float
-    truth: dict[str, np.ndarray] = field(default_factory=dict)
-    gyro: np.ndarray | None = None
-    quality: Quality | None = None
+    sample_period: float
+    true_motion: dict[str, np.ndarray] = field(default_factory=dict)
+    gyro_rates: np.ndarray | None = None
+    readings_quality: Quality | None = None
     recovered_motions: dict[str, RecoveredMotion] = field(default_factory=dict)
-    run: Result | None = None
+    engine_run: Result | None = None
 
     @property
-    def start(self) -> StartState:
+    def start_state(self) -> StartState:
         """Initial state of the recovered motion: that of the run, or level and at rest."""
-        first = (float(self.truth[name][0]) for name in ("pitch", "rate", "heave", "heave rate") if self.truth)
-        return StartState.pitched(*first) if self.truth else StartState()
+        first = (
+            float(self.true_motion[name][0]) for name in ("pitch", "rate", "heave", "heave rate") if self.true_motion
+        )
+        return StartState.pitched(*first) if self.true_motion else StartState()
 
 
 def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress) -> dict[str, Any]:
@@ -103,7 +105,7 @@ def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_prog
         except (RunFailed, GimbalLock) as error:
             failed[name] = str(error)
             continue
-        results |= {} if source.run is None else {name: source.run}
+        results |= {} if source.engine_run is None else {name: source.engine_run}
         results[f"{name}: motion"] = _save_motions(scene, source, output_folder, options)
         sources.append(source)
     arranged = ["  The sensors", *(f"    {line}" for line in array.describe())]
@@ -134,7 +136,7 @@ def check(scene: Scene, engines: tuple[str, ...]) -> tuple[Options, Parameters]:
         raise InputError(scene.file, "run.output_step", scene.run.output_step, allowed)
     if options.file is not None:
         source = _measured_readings(scene, options, p)
-        count, period = len(source.readings), source.period
+        count, period = len(source.readings), source.sample_period
     else:
         if options.zeroed:
             allowed = (
@@ -176,11 +178,11 @@ def _readings_of_run(scene: Scene, engine: str, output_folder: Path) -> Readings
     path = output_folder / f"{engine} readings.csv"
     write(computed, {channel: channel for channel in chain(*channels_of_sensors(p))}, p.sampling_rate, path)
     source = _readings_of_file(engine, path, p)
-    rows = np.searchsorted(computed.times, source.period * (np.arange(len(source.readings)) - 1e-3))
+    rows = np.searchsorted(computed.times, source.sample_period * (np.arange(len(source.readings)) - 1e-3))
     wanted = {name: channel for name, (channel, _) in COMPARED_CHANNELS.items()} | {"heave rate": "z3_rate"}
-    source.truth = {name: computed[channel][rows] for name, channel in wanted.items()}
-    source.run = computed
-    source.gyro = computed["gyro"][rows] if "gyro" in computed.data else None
+    source.true_motion = {name: computed[channel][rows] for name, channel in wanted.items()}
+    source.engine_run = computed
+    source.gyro_rates = computed["gyro"][rows] if "gyro" in computed.data else None
     return source
 
 
@@ -189,12 +191,12 @@ def _recover_motions(
 ) -> None:
     """Recover the motion from the readings by every method, and store it in the source. A suspect sensor, whose
     readings do not fit a rigid body, is used by the first method only."""
-    readings_source.quality = fit_quality(accelerometers, readings_source.readings, parameters.deviation)
-    suspect, readings = readings_source.quality.suspect, readings_source.readings
+    readings_source.readings_quality = fit_quality(accelerometers, readings_source.readings, parameters.deviation)
+    suspect, readings = readings_source.readings_quality.suspect, readings_source.readings
     recover = partial(
         recovered_motion,
-        sample_period=readings_source.period,
-        start_state=readings_source.start,
+        sample_period=readings_source.sample_period,
+        start_state=readings_source.start_state,
         gravity_corrected=study_options.zeroed,
     )
     if suspect:
@@ -207,15 +209,15 @@ def _recover_motions(
     if parameters.deviation > 0:
         filtered_rates, _ = filter_rates(
             spin_from_readings(accelerometers, readings),
-            readings_source.period,
-            np.array(readings_source.start.rates),
+            readings_source.sample_period,
+            np.array(readings_source.start_state.rates),
             parameters.deviation,
         )
         readings_source.recovered_motions["rates held by w w^T"] = recover(
             accelerometers, readings, rates=filtered_rates
         )
-    if readings_source.gyro is not None:
-        turning = readings_source.gyro[:, None] * [
+    if readings_source.gyro_rates is not None:
+        turning = readings_source.gyro_rates[:, None] * [
             0.0,
             1.0,
             0.0,
@@ -238,30 +240,30 @@ def _save_motions(scene: Scene, readings_source: ReadingsSource, output_folder: 
     """Save the recovered pitch, pitch rate and heave: a CSV file per method, and a netCDF result with all methods,
     which is returned."""
     stem, values_of_methods = (
-        Path(readings_source.name).stem,
+        Path(readings_source.source_name).stem,
         {method_name: _compared_values(motion) for method_name, motion in readings_source.recovered_motions.items()},
     )
     for method_name, moved_values in values_of_methods.items():
         columns = {name: (COMPARED_CHANNELS[name][1], values) for name, values in moved_values.items()}
-        write_time_series(output_folder / f"{stem}, {method_name}.csv", columns, readings_source.period)
+        write_time_series(output_folder / f"{stem}, {method_name}.csv", columns, readings_source.sample_period)
     channels = {
         name: Channel(("way", "time"), [moved_values[name] for moved_values in values_of_methods.values()], unit)
         for name, (_, unit) in COMPARED_CHANNELS.items()
     }
-    reading_times = readings_source.period * np.arange(len(readings_source.readings))
+    reading_times = readings_source.sample_period * np.arange(len(readings_source.readings))
     axes = {"way": Channel("way", list(values_of_methods)), "time": Channel("time", reading_times, "s")}
-    saved = result(scene, channels, axes, engine=readings_source.name)
-    assert readings_source.quality is not None
+    saved = result(scene, channels, axes, engine=readings_source.source_name)
+    assert readings_source.readings_quality is not None
     record = Record(
-        readings_source.quality,
+        readings_source.readings_quality,
         readings_source.readings,
-        readings_source.period,
-        not readings_source.truth and not study_options.zeroed,
+        readings_source.sample_period,
+        not readings_source.true_motion and not study_options.zeroed,
     )
     with_assumptions(saved, assumptions(record, readings_source.recovered_motions["integrated"]))
     if scene.error:
         truth_text = (
-            "the table has the error of each way beside the run" if readings_source.truth else "no truth is known"
+            "the table has the error of each way beside the run" if readings_source.true_motion else "no truth is known"
         )
         not_estimated(saved, f"noise and mounts err most, and {truth_text}")
     saved.save(output_folder / f"{stem} motion.nc")
@@ -271,27 +273,28 @@ def _save_motions(scene: Scene, readings_source: ReadingsSource, output_folder: 
 def _summary_of_methods(readings_source: ReadingsSource) -> dict[str, Any]:
     """Summary of the recovered motions: share of misfit in the readings, suspect sensor, and largest and rms error of
     each method; without a true motion, largest and rms value in place of errors."""
-    assert readings_source.quality is not None
+    assert readings_source.readings_quality is not None
     errors_of_methods = {}
     for method_name, motion in readings_source.recovered_motions.items():
         errors = {
-            name: values - readings_source.truth.get(name, 0.0) for name, values in _compared_values(motion).items()
+            name: values - readings_source.true_motion.get(name, 0.0)
+            for name, values in _compared_values(motion).items()
         }
         errors_of_methods[method_name] = {
             name: [float(np.abs(error).max()), root_mean_square(error)] for name, error in errors.items()
         }
-    quality_facts = {name: getattr(readings_source.quality, name) for name in ("share", "rigid", "suspect")}
-    return {"source": readings_source.name, **quality_facts, "ways": errors_of_methods}
+    quality_facts = {name: getattr(readings_source.readings_quality, name) for name in ("share", "rigid", "suspect")}
+    return {"source": readings_source.source_name, **quality_facts, "ways": errors_of_methods}
 
 
 def _screen_lines(readings_source: ReadingsSource, parameters: Parameters) -> list[str]:
     """Lines for the screen: verdict on the readings, then largest and rms error (or value) for each method."""
-    assert readings_source.quality is not None
-    numbers, kind = _summary_of_methods(readings_source), "error" if readings_source.truth else "size"
+    assert readings_source.readings_quality is not None
+    numbers, kind = _summary_of_methods(readings_source), "error" if readings_source.true_motion else "size"
     head = f"largest {kind} (rms)"
     lines = [
-        f"  {readings_source.name}",
-        f"    {_rigidity_text(readings_source.quality)}",
+        f"  {readings_source.source_name}",
+        f"    {_rigidity_text(readings_source.readings_quality)}",
         f"    {head:<28}{'pitch [mrad]':>20}{'rate [rad/s]':>20}{'heave [m]':>20}",
     ]
     for method_name, errors in numbers["ways"].items():
@@ -346,11 +349,11 @@ def _figure(readings_source: ReadingsSource, shown_results: Results, figure_path
     known, and the misfit of the readings from rigid-body motion."""
     from models.drawing.figures import COLUMN_WIDTH, GREY, add_heading, legend_below, save, subplot_mosaic
 
-    assert readings_source.quality is not None
-    reading_times = readings_source.period * np.arange(len(readings_source.readings))
+    assert readings_source.readings_quality is not None
+    reading_times = readings_source.sample_period * np.arange(len(readings_source.readings))
     rows: list[Any] = [
         ["pitch", "heave"],
-        *([["pitch error", "heave error"]] if readings_source.truth else []),
+        *([["pitch error", "heave error"]] if readings_source.true_motion else []),
         ["misfit", "misfit"],
     ]
     figure, axes = subplot_mosaic(rows, figsize=(COLUMN_WIDTH, 2.0 * len(rows) + 0.8), sharex=True)
@@ -368,9 +371,9 @@ def _figure(readings_source: ReadingsSource, shown_results: Results, figure_path
             readings_source,
             name,
         )
-        if readings_source.truth:
+        if readings_source.true_motion:
             errors = {
-                method_name: scale * np.abs(motion[name] - readings_source.truth[name])
+                method_name: scale * np.abs(motion[name] - readings_source.true_motion[name])
                 for method_name, motion in motions.items()
             }
             _plot_errors(
@@ -379,14 +382,16 @@ def _figure(readings_source: ReadingsSource, shown_results: Results, figure_path
                 errors,
                 f"Largest error of the {name} so far {label[label.index('[') :]}",
             )
-    axes["misfit"].plot(reading_times, readings_source.quality.misfit, color=GREY, linewidth=0.4)
+    axes["misfit"].plot(reading_times, readings_source.readings_quality.misfit, color=GREY, linewidth=0.4)
     axes["misfit"].set_title(
-        f"Readings that no rigid motion explains, {100 * readings_source.quality.share:.2g} % [m/s²]"
+        f"Readings that no rigid motion explains, {100 * readings_source.readings_quality.share:.2g} % [m/s²]"
     )
     axes["misfit"].set_xlabel("time [s]")
-    legend_below(figure, axes["pitch error" if readings_source.truth else "pitch"], columns=3)
+    legend_below(figure, axes["pitch error" if readings_source.true_motion else "pitch"], columns=3)
     add_heading(
-        figure, f"Pitch and heave from accelerometers, {readings_source.name}: what each way errs by", shown_results
+        figure,
+        f"Pitch and heave from accelerometers, {readings_source.source_name}: what each way errs by",
+        shown_results,
     )
     save(figure, figure_path)
 
@@ -402,9 +407,11 @@ def _plot_motions(
     """Plot the true motion over time if it is known, else the motion recovered by each method."""
     from models.drawing.figures import TRUTH_COLOUR
 
-    if readings_source.truth:
+    if readings_source.true_motion:
         axis.plot(
-            times, (1e3 if quantity_name == "pitch" else 1.0) * readings_source.truth[quantity_name], color=TRUTH_COLOUR
+            times,
+            (1e3 if quantity_name == "pitch" else 1.0) * readings_source.true_motion[quantity_name],
+            color=TRUTH_COLOUR,
         )
         axis.set_title(f"True {title[0].lower()}{title[1:]}")
         return

@@ -19,7 +19,7 @@ from models.identification.held_out import IdentifiedVehicle, ParameterSearch, i
 from models.identification.of_scene import SceneModel
 from models.systems.single_track.race_file import IDENTIFIED_PARAMETERS, RACE_CAR, write_plain_table
 from models.systems.single_track.scene import SingleTrackScene, build
-from studies.command.identify import identification_lines, identification_record
+from studies.command.identify import identification_as_dict, identification_lines
 
 SYSTEM = "single-track"
 ReportProgress = Callable[[str, float], None]
@@ -78,7 +78,7 @@ def run(
 ) -> dict[str, Any]:
     """Identify the vehicle, predict its motion, and compare with simpler vehicles; saves ``race_car.png``,
     ``predicted.nc`` and the measured drives, and returns the summary."""
-    from studies.race_car_figure import draw
+    from studies.race_car_figure import draw_race_car_figure
 
     options = read(Options, scene.options, scene.file, "options")
     first, second = identification_and_test_scenes(scene, options, output_folder)
@@ -88,15 +88,17 @@ def run(
         ParameterSearch(options.identified_keys(), list(AIMED_ERRORS), options.low_pass, options.blocks),
         report_progress,
     )
-    simpler = {name: identified_simpler(first, second, options, name, report_progress) for name in SIMPLER_VEHICLES}
-    draw(chosen, simpler, scene.title, output_folder / "race_car.png")
+    simpler = {
+        name: identify_simpler_vehicle(first, second, options, name, report_progress) for name in SIMPLER_VEHICLES
+    }
+    draw_race_car_figure(chosen, simpler, scene.title, output_folder / "race_car.png")
     solved = chosen.uncertainty.fit
     predicted = SceneModel(second, [identified_one.name for identified_one in solved.problem.parameters], "").result(
         solved.values
     )
     predicted.save(output_folder / "predicted.nc")
     answer = error_ratios(chosen)
-    answer["identified"] = identification_record(chosen.uncertainty)
+    answer["identified"] = identification_as_dict(chosen.uncertainty)
     answer["simpler vehicles"] = {
         name: dict(zip(AIMED_ERRORS, identified_one.bands.relative_error(), strict=True))
         for name, identified_one in simpler.items()
@@ -157,7 +159,7 @@ def _scene_of_section(scene: SingleTrackScene, section_ends: list[float]) -> Sin
     return scene.model_copy(update={"drive": scene.drive.model_copy(update={"stretch": section_ends}), "options": {}})
 
 
-def identified_simpler(
+def identify_simpler_vehicle(
     identification_scene: SingleTrackScene,
     prediction_scene: SingleTrackScene,
     study_options: Options,
@@ -174,11 +176,14 @@ def identified_simpler(
         report_progress(f"{vehicle_name}: {text}", 0.95)
 
     return identified_vehicle(
-        _with_values(identification_scene, holds), _with_values(prediction_scene, holds), simpler_search, tell
+        _scene_with_values(identification_scene, holds),
+        _scene_with_values(prediction_scene, holds),
+        simpler_search,
+        tell,
     )
 
 
-def _with_values(scene: SingleTrackScene, new_values: dict[str, float]) -> SingleTrackScene:
+def _scene_with_values(scene: SingleTrackScene, new_values: dict[str, float]) -> SingleTrackScene:
     from models.core.scene_file import set_key
 
     table = scene.table()

@@ -14,7 +14,7 @@ SECONDS_SHOWN = 60.0
 """Length (s) of the shown part of the prediction."""
 
 
-def draw(
+def draw_race_car_figure(
     full_vehicle: "IdentifiedVehicle",
     identified_vehicles: dict[str, "IdentifiedVehicle"],
     title: str,

@@ -45,7 +45,7 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], output_folder: Path, rep
         "effects": [str(consequence) for consequence in exam.consequences],
         "findings": findings_as_dicts(finding for finding in exam.findings if finding.weight != "note"),
         "doubts": sum(finding.weight == "doubt" for finding in exam.findings),
-        "channels": _force_sizes(exam),
+        "channels": _section_force_magnitudes(exam),
         "table": [*_lines_of_findings(exam), f"  the page: {page}"],
     }
 
@@ -63,7 +63,7 @@ def _failure_reasons(examined_recording: Examination) -> dict[str, str]:
     }
 
 
-def _force_sizes(examined_recording: Examination) -> dict[str, Any]:
+def _section_force_magnitudes(examined_recording: Examination) -> dict[str, Any]:
     """Unit, largest magnitude and rms of each section force, for the summary."""
     sizes = dict[str, Any]()
     for answer, counted in examined_recording.counted.items():

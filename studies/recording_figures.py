@@ -34,9 +34,9 @@ from models.vehicles.cut_vehicle import ANGLES, GRAVITY
 
 MARKED_SECONDS, UNMARKED_SECONDS, MOST_SAMPLES = 0.6, 15.0, 20_000
 """Time (s) drawn before and after a marked span; time (s) drawn without a mark; largest number of drawn samples."""
-SHOWN_SIGNALS = 4
+SHOWN_SIGNAL_LIMIT = 4
 """Largest number of signals in a figure."""
-TITLE_LETTERS = 60
+TITLE_LETTER_LIMIT = 60
 """Longest text (letters) of a finding's place in a figure's title."""
 CURVE_COLUMNS = 1200
 """Number of columns of a long curve; least and largest value of each column are drawn, so that no peak is lost."""
@@ -67,9 +67,9 @@ def figure_of_finding(finding: Finding, recording_data: Evidence, figure_path: P
         return _plot_mean_forces(recording_data, figure_path)
     if recording_data.agreement is not None and fault is not None:
         return (
-            _plot_exchange(recording_data, fault, figure_path)
+            _plot_exchanged_hubs(recording_data, fault, figure_path)
             if fault.kind == "swapped"
-            else _plot_ratio(recording_data, fault, figure_path)
+            else _plot_channel_ratio(recording_data, fault, figure_path)
         )
     return (
         _plot_spectrum(recording_data, signals, figure_path)
@@ -95,7 +95,7 @@ def _save_titled(
 
 def _plot_signals(finding: Finding, recording_data: Evidence, signals: tuple[Signal, ...], figure_path: Path) -> Path:
     """Save a figure of the signals of a finding over time, with the time span of the finding marked."""
-    recording, marked, shown = recording_data.recording, finding.times, signals[:SHOWN_SIGNALS]
+    recording, marked, shown = recording_data.recording, finding.times, signals[:SHOWN_SIGNAL_LIMIT]
     begin = max(marked[0] - MARKED_SECONDS, 0.0) if marked else 0.0
     end = min(marked[1] + MARKED_SECONDS if marked else UNMARKED_SECONDS, recording.duration)
     first_sample, last_sample = round(begin / recording.period), round(end / recording.period) + 1
@@ -119,7 +119,9 @@ def _plot_signals(finding: Finding, recording_data: Evidence, signals: tuple[Sig
             )
     axes[-1, 0].set_xlabel("time [s]" + ("; yellow: what is meant" if marked else ""))
     return _save_titled(
-        drawn, f"{shorten(finding.place or 'Recording', TITLE_LETTERS, placeholder=' ...')}: as recorded", figure_path
+        drawn,
+        f"{shorten(finding.place or 'Recording', TITLE_LETTER_LIMIT, placeholder=' ...')}: as recorded",
+        figure_path,
     )
 
 
@@ -144,7 +146,7 @@ def _plot_mean_forces(recording_data: Evidence, figure_path: Path) -> Path:
     return _save_titled(drawn, "Mean vertical forces", figure_path, axis)
 
 
-def _plot_ratio(recording_data: Evidence, suspected_fault: MeasurementFault, figure_path: Path) -> Path:
+def _plot_channel_ratio(recording_data: Evidence, suspected_fault: MeasurementFault, figure_path: Path) -> Path:
     """Save a figure of the ratio of a channel's reading to its expected value over frequency; a delay shows as a slope
     of the phase, a wrong factor as a constant magnitude."""
     agreement = recording_data.agreement
@@ -185,7 +187,7 @@ def _plot_ratio(recording_data: Evidence, suspected_fault: MeasurementFault, fig
     return _save_titled(drawn, title, figure_path, axes[0], "outside lower center")
 
 
-def _plot_exchange(recording_data: Evidence, suspected_fault: MeasurementFault, figure_path: Path) -> Path:
+def _plot_exchanged_hubs(recording_data: Evidence, suspected_fault: MeasurementFault, figure_path: Path) -> Path:
     """Save a bar chart of the share of each reading that the hub forces do not explain, with the hubs as mapped and
     with two of them exchanged."""
     agreement = recording_data.agreement
@@ -213,7 +215,7 @@ def _plot_spectrum(recording_data: Evidence, signals: tuple[Signal, ...], figure
 
     recording = recording_data.recording
     drawn, axis = subplots(figsize=(COLUMN_WIDTH, 3.4))
-    for signal in signals[:SHOWN_SIGNALS]:
+    for signal in signals[:SHOWN_SIGNAL_LIMIT]:
         values = recording.samples(signal)
         f, density = welch(
             np.where(np.isfinite(values), values, np.nanmean(values)), 1 / recording.period, nperseg=2048
@@ -252,7 +254,7 @@ def _panels_over_time(row_count: int, height: float, **options_of_panels: Any) -
     return drawn, panels
 
 
-def inputs_figure(examined_recording: Examination, figure_path: Path) -> Path:
+def measured_forces_figure(examined_recording: Examination, figure_path: Path) -> Path:
     """Save a figure of the measured forces at all hubs along each axis over time."""
     recording, axes = (
         examined_recording.recording,
@@ -321,7 +323,7 @@ def _angles_of_runs(examined_recording: Examination, angle_name: str) -> dict[st
     return curves
 
 
-def forces_figure(
+def section_forces_figure(
     recording_run: SectionOutcome, section_channels: Sequence[SectionChannel], figure_path: Path, run_name: str = ""
 ) -> Path:
     """Save a figure of section forces over the complete recording, and of two seconds about the peak of each."""
@@ -344,7 +346,7 @@ def forces_figure(
     return save(drawn, figure_path)
 
 
-def counting_figure(counted_loads: dict[SectionChannel, CountedLoad], figure_path: Path) -> Path:
+def load_counts_figure(counted_loads: dict[SectionChannel, CountedLoad], figure_path: Path) -> Path:
     """Save a figure of the level crossings and range pairs of some section forces."""
     drawn, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
     for colour, (answer, counts) in zip(WHEEL_COLOURS, counted_loads.items(), strict=False):
@@ -362,7 +364,7 @@ def counting_figure(counted_loads: dict[SectionChannel, CountedLoad], figure_pat
     return save(drawn, figure_path)
 
 
-def overlay_figure(
+def measured_and_computed_figure(
     examined_recording: Examination,
     recording_run: SectionOutcome,
     channel_comparisons: Sequence[ChannelComparison],

@@ -30,7 +30,7 @@ RUN_NAMES = {
 }
 NEGLIGIBLE_CHANGE = 1e-6
 """Range (N, N m) below which a section force counts as constant: smaller changes are rounding."""
-DRAWN_FORCES = 6
+DRAWN_FORCE_LIMIT = 6
 """Largest number of section forces that are drawn; all are in the table and in the files."""
 
 
@@ -86,7 +86,7 @@ def page_text(examined_recording: Examination, output_folder: Path, saved_result
 def _page_figures(examined_recording: Examination, output_folder: Path) -> dict[str, Any]:
     """Figures of the recording's page by name: input forces, findings above a note, drift of the runs, and measured
     channels that were not inputs of the run."""
-    figures: dict[str, Any] = {"inputs": draw.inputs_figure(examined_recording, output_folder / "inputs.png")}
+    figures: dict[str, Any] = {"inputs": draw.measured_forces_figure(examined_recording, output_folder / "inputs.png")}
     figures["findings"] = [
         (finding, draw.figure_of_finding(finding, examined_recording.evidence, output_folder / f"finding_{i}.png"))
         for i, finding in enumerate(examined_recording.findings)
@@ -98,8 +98,8 @@ def _page_figures(examined_recording: Examination, output_folder: Path) -> dict[
         shown = [
             comparison for comparison in examined_recording.channel_comparisons if comparison.signal.check
         ] or examined_recording.channel_comparisons
-        figures["checks"] = draw.overlay_figure(
-            examined_recording, examined_recording.outcome, shown[:DRAWN_FORCES], output_folder / "checks.png"
+        figures["checks"] = draw.measured_and_computed_figure(
+            examined_recording, examined_recording.outcome, shown[:DRAWN_FORCE_LIMIT], output_folder / "checks.png"
         )
     return figures
 
@@ -114,7 +114,7 @@ def _section_force_content(
         for answer, counts in examined_recording.counted.items()
         if counts.largest_load - counts.smallest_load > NEGLIGIBLE_CHANGE
     }
-    first, connectors = list(moving)[:DRAWN_FORCES], set(examined_recording.rig.places.connectors)
+    first, connectors = list(moving)[:DRAWN_FORCE_LIMIT], set(examined_recording.rig.places.connectors)
     return {
         "slope": WOEHLER_SLOPE,
         "true": errors_of_run(run_outcome, examined_recording.virtual, WOEHLER_SLOPE).damage
@@ -127,6 +127,10 @@ def _section_force_content(
             {a: counts for a, counts in moving.items() if (a.section in connectors) is is_connector}
             for is_connector in (True, False)
         ],
-        "forces": draw.forces_figure(run_outcome, first, output_folder / "forces.png", examined_recording.chosen_run),
-        "counting": draw.counting_figure({answer: moving[answer] for answer in first}, output_folder / "counting.png"),
+        "forces": draw.section_forces_figure(
+            run_outcome, first, output_folder / "forces.png", examined_recording.chosen_run
+        ),
+        "counting": draw.load_counts_figure(
+            {answer: moving[answer] for answer in first}, output_folder / "counting.png"
+        ),
     }

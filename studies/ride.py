@@ -87,7 +87,7 @@ def run(
     vehicle, speeds = vehicle_of(scene), scene.speeds.all()
     wheel_positions, speed = wheels(vehicle), options.speed or float(speeds[len(speeds) // 2])
     engines = ("reference",) if vehicle.limits and len(engines) > 1 else engines  # no other has rigid springs
-    roads = _correlations(scene, vehicle)
+    roads = _road_correlation_cases(scene, vehicle)
     results = {}
     for i, engine in enumerate(engines):
         report_progress(f"linear vehicle of {engine}", 0.6 * i / len(engines))
@@ -126,7 +126,7 @@ def run(
     }
 
 
-def _correlations(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[str, str] | None]:
+def _road_correlation_cases(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[str, str] | None]:
     """Cases of road correlation by name: as in the scene (None), then simpler ones. Independent tracks are left out for
     a vehicle with wheels both in the middle and at the sides."""
     sided = {wheel.y != 0.0 for wheel in placed_wheels(scene, wheels(vehicle))}

@@ -28,7 +28,7 @@ ReportProgress = Callable[[str, float], None]
 
 LOWEST_CHANGE, HIGHEST_CHANGE = 1e-4, 1e3
 """Ends of the axis of changes (per cent); smaller or larger changes are drawn at the ends."""
-ELEMENTS_DRAWN = 12
+DRAWN_ELEMENT_LIMIT = 12
 """Largest number of elements whose energy activity is drawn, the most active first."""
 
 
@@ -203,7 +203,7 @@ def choice_figure(
         single.effect.name + ("  [left out]" if single.effect in effect_choice.left_out else "")
         for single in single_effects
     ]
-    heights = 1.6 + 0.26 * (len(names) + 1), 0.7 + 0.2 * ELEMENTS_DRAWN
+    heights = 1.6 + 0.26 * (len(names) + 1), 0.7 + 0.2 * DRAWN_ELEMENT_LIMIT
     figure, (changes_axis, activity_axis) = subplots(
         2, 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.4), height_ratios=heights
     )
@@ -238,7 +238,7 @@ def _plot_activity(axis: Any, activity_of_element: dict[str, float]) -> None:
 
     finite = {name: value for name, value in activity_of_element.items() if np.isfinite(value)}
     total = sum(finite.values())
-    shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS_DRAWN][::-1]
+    shown = sorted(finite.items(), key=lambda item: -item[1])[:DRAWN_ELEMENT_LIMIT][::-1]
     axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color=BLUE, alpha=0.7)
     without = [name for name in activity_of_element if name not in finite]
     note = f"\n{len(without)} inertias are unbounded under white noise" if without else ""
@@ -277,7 +277,7 @@ def _table_lines(
             "  {}: {} predicted, {} confirmed; {} at the worst speed of the range, {} there with parameters "
             "5 % off; tolerance {}".format(name, *change_texts, tolerance)
         )
-    lines += saving_lines(effect_choice, tolerance)
+    lines += saved_work_lines(effect_choice, tolerance)
     lines += ["  alone, what leaving it out changes (confirmed):"]
     lines += [
         f"    {single.effect.name}: {', '.join(map(percent_text, single.confirmed_change))}"
@@ -296,7 +296,7 @@ def _table_lines(
     )
 
 
-def saving_lines(effect_choice: RideChoice, tolerance_text: str) -> list[str]:
+def saved_work_lines(effect_choice: RideChoice, tolerance_text: str) -> list[str]:
     """Lines for the screen on steps and calls at equal accuracy before and after the choice of effects."""
     cost_before, cost_after = effect_choice.cost_before, effect_choice.cost_after
     lines = [

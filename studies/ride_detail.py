@@ -58,7 +58,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     names = {output.name for output in full.outputs}
     for i, vehicle in enumerate(simpler):
         if not names & {output.name for output in vehicle.outputs}:
-            key_path, name = f"options.simpler.{i}", _options(scene).simpler[i]
+            key_path, name = f"options.simpler.{i}", _study_options(scene).simpler[i]
             raise InputError(scene.file, key_path, name, "has no output of the same name as the scene's vehicle")
 
 
@@ -67,7 +67,7 @@ def run(
 ) -> dict[str, Any]:
     """Compare vehicle and road models with the scene's; saves ``errors.nc`` and ``.csv``, and a figure; returns the
     summary."""
-    from studies.ride_figures import FigureHeading, detail_figure
+    from studies.ride_figures import FigureHeading, model_error_figure
 
     check(scene, engines)
     full, plain = vehicle_of(scene), scene.model_copy(update={"weighting": {}})
@@ -88,7 +88,7 @@ def run(
     costs = _computing_times(scene, models)
     _save_errors(scene, errors, names, results, output_folder)
     middle = {name: float(np.median(seconds)) for name, seconds in costs.items()}
-    detail_figure(errors, names, middle, FigureHeading(scene.title, results), output_folder / "detail.png")
+    model_error_figure(errors, names, middle, FigureHeading(scene.title, results), output_folder / "detail.png")
     answer = {
         f"{model}, {road}": {
             name: None if np.isnan(value) else float(value) for name, value in zip(names, values, strict=True)
@@ -105,12 +105,12 @@ def run(
     }
 
 
-def _options(scene: RideScene) -> Options:
+def _study_options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
 def _simpler_vehicles(scene: RideScene) -> list[SpatialVehicle]:
-    names = enumerate(_options(scene).simpler)
+    names = enumerate(_study_options(scene).simpler)
     return [load_vehicle(name, scene.folder, scene.file, f"options.simpler.{i}") for i, name in names]
 
 

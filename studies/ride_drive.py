@@ -36,7 +36,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
         allowed = "has side forces or drag, which change with the speed: this study takes matrices that do not"
         raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
     names = tuple(output.name for output in vehicle.outputs)
-    for i, name in enumerate(_options(scene).outputs):
+    for i, name in enumerate(_study_options(scene).outputs):
         if name not in names:
             raise InputError(scene.file, f"options.outputs.{i}", name, "is no output of the vehicle", names)
 
@@ -56,7 +56,7 @@ def run(
     drive, quasi_stationary, units = result.detail, result["quasi_stationary"], result["unit"].tolist()
     kinds = {output.name: (output.kind, unit) for output, unit in zip(vehicle.outputs, units, strict=False)}
     shown = [name for name, (kind, _) in kinds.items() if kind in ("acceleration", "tyre force")]
-    shown = _options(scene).outputs or shown or list(kinds)
+    shown = _study_options(scene).outputs or shown or list(kinds)
     drive_figure(
         drive, quasi_stationary, shown, kinds, FigureHeading(scene.title, {engine: result}), output_folder / "drive.png"
     )
@@ -70,7 +70,7 @@ def run(
     }
 
 
-def _options(scene: RideScene) -> Options:
+def _study_options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 

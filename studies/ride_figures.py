@@ -48,7 +48,7 @@ class FigureHeading(NamedTuple):
     """Title of a figure, and the results whose warnings are printed below it."""
 
     title: str
-    results: Results
+    shown_results: Results
 
 
 def body_acceleration_figure(
@@ -63,7 +63,7 @@ def body_acceleration_figure(
     """Save a figure of the standard deviation of the body's vertical acceleration in each case of road correlation:
     along the body at a speed (m/s), and over speed for the output nearest to the middle of the axles."""
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
-    name = _middle_acceleration(vehicle)
+    name = _name_of_middle_acceleration(vehicle)
     for i, case in enumerate(sweep_of_points.cases):
         left.plot(
             point_positions,
@@ -90,7 +90,7 @@ def body_acceleration_figure(
     _save_figure(figure, heading, ": which correlations of the road matter where", figure_path)
 
 
-def _middle_acceleration(vehicle: SpatialVehicle) -> str:
+def _name_of_middle_acceleration(vehicle: SpatialVehicle) -> str:
     """Name of the vertical acceleration output nearest to the middle of the axles, "" if there is none."""
     middle = (vehicle.axles[0] + vehicle.axles[-1]) / 2
     points = [o for o in vehicle.outputs if o.kind == "acceleration" and getattr(o, "axis", None) == (0.0, 0.0, 1.0)]
@@ -226,7 +226,7 @@ def road_figure(
     _save_figure(figure, heading, ": the road", figure_path)
 
 
-def detail_figure(
+def model_error_figure(
     relative_errors: Mapping[tuple[str, str], np.ndarray],
     output_names: Sequence[str],
     computing_times: Mapping[str, float],
@@ -312,7 +312,7 @@ def nonlinear_figure(nonlinear_sweep: Nonlinear, heading: FigureHeading, figure_
     """Save a figure of each output's standard deviation over speed by small motion, statistical linearisation and Monte
     Carlo copies; open marks show where statistical linearisation states a large error."""
     outputs = nonlinear_sweep.shown.vehicle.outputs
-    figure, axes = _few_panels(min(len(outputs), DRAWN_OUTPUT_LIMIT))
+    figure, axes = _figure_with_few_panels(min(len(outputs), DRAWN_OUTPUT_LIMIT))
     left = nonlinear_sweep.quantity_by_speed("left_out")
     for i, (axis, output) in enumerate(zip(axes, outputs, strict=False)):
         unit, factor = _shown_unit(output.unit)
@@ -372,7 +372,7 @@ def engine_spectra_figure(
     shown = [i for i in range(len(linear_vehicle.outputs)) if np.isfinite(first.outputs[:, i]).all()][
         :DRAWN_OUTPUT_LIMIT
     ]
-    figure, axes = _few_panels(len(shown))
+    figure, axes = _figure_with_few_panels(len(shown))
     for axis, i in zip(axes, shown, strict=True):
         for (engine, run), (line, width) in zip(runs_by_engine.items(), (("-", 2.2), ("--", 1.0)), strict=False):
             f, density = run.densities(frequency[-1])
@@ -386,7 +386,7 @@ def engine_spectra_figure(
     _save_figure(figure, heading, f"\nSpectra at {speed:g} m/s", figure_path)
 
 
-def _few_panels(panel_count: int) -> tuple[Figure, list[Axes]]:
+def _figure_with_few_panels(panel_count: int) -> tuple[Figure, list[Axes]]:
     """Figure and axes of small panels, two or three side by side."""
     figure, axes = panels(panel_count, 2 if panel_count in (1, 2, 4) else 3, 2.6)
     figure.set_figheight(figure.get_figheight() + 0.8)  # for title and legend
@@ -399,5 +399,5 @@ def _legend_under_panel(axis: Axes, relative_drop: float = 0.18) -> None:
 
 
 def _save_figure(figure: Figure, heading: FigureHeading, title_ending: str, figure_path: Path) -> None:
-    add_heading(figure, heading.title + title_ending, heading.results)
+    add_heading(figure, heading.title + title_ending, heading.shown_results)
     save(figure, figure_path)

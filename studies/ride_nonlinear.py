@@ -41,7 +41,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     for name, weighting_name in scene.weighting.items():
         raise InputError(scene.file, f"weighting.{name}", weighting_name, "is not read by this study: leave it out")
     check_rates(vehicle, excitation_of(scene, wheels(vehicle)), scene.file)
-    options = _options(scene)
+    options = _study_options(scene)
     for i, speed in enumerate(options.beside):
         if not speed > 0.0:
             raise InputError(scene.file, f"options.beside.{i}", speed, "must be above 0, in m/s")
@@ -59,7 +59,7 @@ def run(
 
     check(scene, engines)
     assert scene.speeds is not None
-    options, vehicle = _options(scene), vehicle_of(scene)
+    options, vehicle = _study_options(scene), vehicle_of(scene)
     speed, road = options.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
     results = {
         "reference": run_scene(scene, "reference", sampling=options, progress=report_progress, error=scene.error)
@@ -86,11 +86,11 @@ def run(
         "answer": _summary_of_deviations(answer),
         "table": _table_lines(answer, speed)
         + _lift_off_shares(vehicle, answer, runs)
-        + _time_table(runs, answer, road, speed),
+        + _engine_run_lines(runs, answer, road, speed),
     }
 
 
-def _options(scene: RideScene) -> Options:
+def _study_options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
@@ -186,7 +186,7 @@ def _lift_off_shares(vehicle: SpatialVehicle, nonlinear_sweep: Nonlinear, runs_b
     return lines
 
 
-def _time_table(
+def _engine_run_lines(
     runs_by_engine: dict[str, Ride], nonlinear_sweep: Nonlinear, road_excitation: Excitation, speed: float
 ) -> list[str]:
     """Lines for the screen: the engines' standard deviations beside statistical linearisation, and the difference

@@ -26,7 +26,7 @@ def run(
     report_progress("the drive", 0.0)
     driven = run_scene(scene, error=scene.error)
     driven.save(output_folder / "drive.nc")
-    figure(driven, measured_channels(scene, driven), scene.title, output_folder / "drive.png")
+    drive_figure(driven, measured_channels(scene, driven), scene.title, output_folder / "drive.png")
     answer = {
         f"rms of {name} [{unit}]": float(np.sqrt(np.mean(driven[name] ** 2))) for name, unit in SHOWN_CHANNELS.items()
     }
@@ -55,7 +55,9 @@ def measured_channels(scene: SingleTrackScene, computed_drive: Result) -> dict[s
     return {name: np.interp(computed_drive.times, *time_and_values) for name, time_and_values in curves.items()}
 
 
-def figure(computed_drive: Result, measured_values: Mapping[str, np.ndarray], title: str, figure_path: Path) -> Path:
+def drive_figure(
+    computed_drive: Result, measured_values: Mapping[str, np.ndarray], title: str, figure_path: Path
+) -> Path:
     """Save a figure of the steer angle and three channels over time, of each axle's slip angle over time, and of its
     ratio of side force to load over slip angle.
 

@@ -114,7 +114,7 @@ def _draw_figures(measured_run: Result, runs_by_name: dict[str, Result], output_
     """Save figures like Figs 4 to 8 of the paper."""
     from models.drawing.figures import save
 
-    save(_figure_measurement(measured_run), output_folder / "fig4_measurement.png")
+    save(_measurement_figure(measured_run), output_folder / "fig4_measurement.png")
     main = {
         "virtual measurement": measured_run,
         "undisturbed": runs_by_name["undisturbed"],
@@ -122,7 +122,7 @@ def _draw_figures(measured_run: Result, runs_by_name: dict[str, Result], output_
         "perturbed model": runs_by_name["perturbed"],
         "both": runs_by_name["both"],
     }
-    save(_figure_drift(main, "Force-excited runs beside the measurement"), output_folder / "fig5_drift.png")
+    save(_drift_figure(main, "Force-excited runs beside the measurement"), output_folder / "fig5_drift.png")
     for prefix, title, name in (
         ("noisy", "noise samples", "fig6_noise_samples"),
         ("model", "perturbed models", "fig7_perturbed_models"),
@@ -132,11 +132,11 @@ def _draw_figures(measured_run: Result, runs_by_name: dict[str, Result], output_
         }
         if len(chosen) == 1:
             continue
-        save(_figure_drift(chosen, f"Force-excited runs: {len(chosen) - 1} {title}"), output_folder / f"{name}.png")
-    save(_figure_moment(runs_by_name["guided, both"]), output_folder / "fig8_enforced_moment.png")
+        save(_drift_figure(chosen, f"Force-excited runs: {len(chosen) - 1} {title}"), output_folder / f"{name}.png")
+    save(_moment_figure(runs_by_name["guided, both"]), output_folder / "fig8_enforced_moment.png")
 
 
-def _figure_measurement(measured_run: Result) -> Any:
+def _measurement_figure(measured_run: Result) -> Any:
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     figure, axes = subplots(2, 2, figsize=(COLUMN_WIDTH, 4.6), sharex="col", width_ratios=(2, 1))
@@ -156,7 +156,7 @@ def _figure_measurement(measured_run: Result) -> Any:
     return figure
 
 
-def _figure_drift(results_by_run: dict[str, Result], title: str) -> Any:
+def _drift_figure(results_by_run: dict[str, Result], title: str) -> Any:
     """Figure of each run's heave error on a logarithmic scale, and of its pitch; the first of the results is the
     measurement."""
     from models.drawing.figures import COLUMN_WIDTH, TRUTH_COLOUR, add_heading, legend_below, subplots
@@ -174,7 +174,7 @@ def _figure_drift(results_by_run: dict[str, Result], title: str) -> Any:
     return figure
 
 
-def _figure_moment(stabilised_run: Result) -> Any:
+def _moment_figure(stabilised_run: Result) -> Any:
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, (inertia, moment) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.2))

@@ -97,7 +97,7 @@ def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_prog
     rows = _drift_off_rows(curves, runs, spread, options)
     table = _table_lines(rows, options, deviation, pitch_error_growth(assembly).rate, base, curves)
     write_whole(output_folder / "table.txt", "\n".join(table) + "\n")
-    saved = _with_errors(_saved_paths(scene, rows, spread), quiet, spread, options)
+    saved = _with_stated_errors(_result_of_paths(scene, rows, spread), quiet, spread, options)
     saved.save(output_folder / "trust.nc")
     results = {"forces without noise": quiet, "growth": saved} | ({} if measured is None else {"measurement": measured})
     report_progress("figure", 0.9)
@@ -164,7 +164,7 @@ def _ensemble_of_paths(
     return {"times": row_times, "drift_off": paths["drift_off"], "errors": errors}
 
 
-def _with_errors(
+def _with_stated_errors(
     trust_result: Result, quiet_run: Result, drift_off_times: dict[str, np.ndarray], study_options: Options
 ) -> Result:
     """The result with two stated errors: the step error, estimated on the run without noise, and the standard error of
@@ -178,7 +178,7 @@ def _with_errors(
     return with_sampling_error(trust_result, {"median drift-off by noise": error}, study_options.paths)
 
 
-def _saved_paths(scene: Scene, trust_rows: list[TrustRow], drift_off_times: dict[str, np.ndarray]) -> Result:
+def _result_of_paths(scene: Scene, trust_rows: list[TrustRow], drift_off_times: dict[str, np.ndarray]) -> Result:
     """Result to be saved: times (s) after which each source of error takes the motion out of tolerance, and the same
     times and the pitch errors of random runs with noise."""
     drift_off = {
@@ -245,7 +245,8 @@ def _table_lines(
     lines = [
         f"  pitch {study_options.angle:g} rad off after [s]     predicted   measured",
         *(
-            f"  {SOURCE_NAMES[row['source']]:<28} {_drift_off_text(row['predicted']):>14} {_measured_text(row):>10}"
+            f"  {SOURCE_NAMES[row['source']]:<28} {_drift_off_text(row['predicted']):>14} "
+            f"{_measured_drift_off_text(row):>10}"
             for row in trust_rows
         ),
     ]
@@ -263,7 +264,7 @@ def _drift_off_text(drift_off_time: float | None) -> str:
     return "beyond the run" if drift_off_time is None else f"{drift_off_time:.2f}"
 
 
-def _measured_text(trust_row: TrustRow) -> str:
+def _measured_drift_off_text(trust_row: TrustRow) -> str:
     if trust_row["source"] == "rounding":
         return "-"
     if trust_row["quartiles"]:

@@ -10,18 +10,18 @@ from typing import Any
 from models.core.whole_files import write_whole
 from models.drawing.pages import environment_of
 from models.own_model.elements import Element, elements_of_model, is_word, two_digit_text, value_text
-from studies.command.twin import Twins, verdict_sentence
+from studies.command.twin import TwinResults, verdict_sentence
 
 PAGE_TEMPLATE = "twin.html.jinja"
 
 
-def write(twin_results: Twins, page_path: Path) -> Path:
+def write(twin_results: TwinResults, page_path: Path) -> Path:
     """Write the page on examined model files as a complete file; returns its path."""
     write_whole(page_path, page_text(twin_results))
     return page_path
 
 
-def page_text(twin_results: Twins) -> str:
+def page_text(twin_results: TwinResults) -> str:
     """HTML text of the page on examined model files."""
     environment = environment_of(Path(__file__).parent)
     environment.filters |= {"short": two_digit_text, "g": lambda number: f"{number:.6g}"}

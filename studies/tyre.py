@@ -50,7 +50,9 @@ def run(
     tables = tyre_tables_of(scene)
     answer = {name: table.characteristic_values(options.load) for name, table in tables.items()}
     results = {
-        name: save(scene, table, options, output_folder / f"{name.replace('/', '_').replace(' ', '_')}.csv")
+        name: save_tyre_friction(
+            scene, table, options, output_folder / f"{name.replace('/', '_').replace(' ', '_')}.csv"
+        )
         for name, table in tables.items()
     }
     tyre_figure(tables, (options.slip_angles, options.load), scene.title, output_folder / "tyre.png", results)
@@ -77,7 +79,7 @@ def friction_lines(figures_by_tyre: dict[str, dict[str, float]], wheel_load: flo
     ]
 
 
-def save(scene: BrakingScene, tyre_table: TyreTable, study_options: Options, output_path: Path) -> Result:
+def save_tyre_friction(scene: BrakingScene, tyre_table: TyreTable, study_options: Options, output_path: Path) -> Result:
     """Save a tyre's friction at zero and the options' slip angles, at all slips of its table, as netCDF and CSV;
     returns the result."""
     angles, axes = np.unique([0.0, *study_options.slip_angles]), ("slip_angle", "slip")

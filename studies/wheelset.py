@@ -33,7 +33,7 @@ def run(
 ) -> dict[str, Any]:
     """Compute eigenvalues over speed, and runs at the scene's speeds; saves ``eigenvalues.nc``, ``paths.nc``,
     ``over_speed.csv`` and figures, and returns the summary."""
-    from studies.wheelset_figures import creep_figure, paths_figure, stability_figure
+    from studies.wheelset_figures import creep_force_figure, lateral_motion_figure, stability_figure
 
     wheelset, failed, eigenvalues, paths = (
         wheelset_of(scene),
@@ -53,19 +53,19 @@ def run(
     linear = {engine: result.detail for engine, result in eigenvalues.items()}
     if linear:
         joined_result(join_results(eigenvalues, "engine"), eigenvalues).save(output_folder / "eigenvalues.nc")
-        _save_table(linear, output_folder)
+        _save_speed_table(linear, output_folder)
         stability_figure(eigenvalues, wheelset, scene.title, output_folder / "stability.png")
     if paths:
         over_speeds(paths).save(output_folder / "paths.nc")
-        paths_figure(paths, scene.title, output_folder / "paths.png")
-        creep_figure(next(iter(paths.values())), scene.title, output_folder / "creep.png")
+        lateral_motion_figure(paths, scene.title, output_folder / "paths.png")
+        creep_force_figure(next(iter(paths.values())), scene.title, output_folder / "creep.png")
     if conicities:
         conicities.save(output_folder / "conicity.nc")
     return {
         "scene": scene.title,
         "folder": str(output_folder),
         "failed": failed,
-        "answer": _summary_of_paths(wheelset, linear, paths)
+        "answer": _summary_of_runs(wheelset, linear, paths)
         | (conicity.conicity_numbers(conicities) if conicities else {}),
         "results": {
             **_results_by_name(paths),
@@ -76,7 +76,7 @@ def run(
             *(conicity.conicity_lines(conicities.detail) if conicities else []),
             *_wavelength_lines(wheelset, linear),
             *_stability_lines(wheelset, linear),
-            *_path_lines(scene, paths),
+            *_run_lines(scene, paths),
         ],
     }
 
@@ -90,7 +90,7 @@ def _results_by_name(wheelset_runs: RunsByEngineAndSpeed) -> dict[str, Result]:
     }
 
 
-def _save_table(linear_results: dict[str, LinearisedMotion], output_folder: Path) -> None:
+def _save_speed_table(linear_results: dict[str, LinearisedMotion], output_folder: Path) -> None:
     """Save a CSV table of growth rate (1/s), and damping and frequency of hunting, over speed."""
     columns = {"speed": ("m/s", next(iter(linear_results.values())).speeds)}
     for engine, linear_run in linear_results.items():
@@ -100,7 +100,7 @@ def _save_table(linear_results: dict[str, LinearisedMotion], output_folder: Path
     write_table(output_folder / "over_speed.csv", columns)
 
 
-def _summary_of_paths(
+def _summary_of_runs(
     wheelset: Wheelset, linear_results: dict[str, LinearisedMotion], wheelset_runs: RunsByEngineAndSpeed
 ) -> dict[str, Any]:
     """Summary in SI units: wavelengths, critical speed by engine (None if there is none), and largest power of the
@@ -162,7 +162,7 @@ def _critical_speed_text(
     )
 
 
-def _path_lines(scene: WheelsetScene, wheelset_runs: RunsByEngineAndSpeed) -> list[str]:
+def _run_lines(scene: WheelsetScene, wheelset_runs: RunsByEngineAndSpeed) -> list[str]:
     """Lines for the screen on the end of each run, the differences between the engines, and the energy balance."""
     if not wheelset_runs:
         return []

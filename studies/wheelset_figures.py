@@ -102,7 +102,7 @@ def stability_figure(
     save(figure, figure_path)
 
 
-def paths_figure(runs_by_engine: Mapping[str, Mapping[float, Result]], title: str, figure_path: Path) -> None:
+def lateral_motion_figure(runs_by_engine: Mapping[str, Mapping[float, Result]], title: str, figure_path: Path) -> None:
     """Save a figure of the lateral displacement over time, with a panel per speed, and below it the difference of each
     engine from the first."""
     paths: dict[str, dict[float, Motion]] = {
@@ -137,7 +137,7 @@ def paths_figure(runs_by_engine: Mapping[str, Mapping[float, Result]], title: st
     save(figure, figure_path)
 
 
-def creep_figure(runs_by_speed: Mapping[float, Result], title: str, figure_path: Path) -> None:
+def creep_force_figure(runs_by_speed: Mapping[float, Result], title: str, figure_path: Path) -> None:
     """Save a figure of the creep forces on each wheel, and of their power, over the last second of every run."""
     paths: dict[float, Motion] = {speed: result.detail for speed, result in runs_by_speed.items()}
     figure, axes = subplots(3, len(paths), figsize=(COLUMN_WIDTH, 6.0), squeeze=False, sharex="col")
@@ -157,7 +157,7 @@ def creep_figure(runs_by_speed: Mapping[float, Result], title: str, figure_path:
     save(figure, figure_path)
 
 
-def branch_figure(limit_cycle_branch: Result, wheelset: Wheelset, title: str, figure_path: Path) -> None:
+def limit_cycle_branch_figure(limit_cycle_branch: Result, wheelset: Wheelset, title: str, figure_path: Path) -> None:
     """Save a figure of amplitude and frequency of the limit cycles over speed: stable ones filled, unstable ones
     open."""
     orbits: Sequence[Orbit] = limit_cycle_branch.detail
@@ -191,7 +191,7 @@ def branch_figure(limit_cycle_branch: Result, wheelset: Wheelset, title: str, fi
     save(figure, figure_path)
 
 
-def cycle_figure(cycles_by_engine: Mapping[str, Result], title: str, figure_path: Path) -> None:
+def limit_cycle_figure(cycles_by_engine: Mapping[str, Result], title: str, figure_path: Path) -> None:
     """Save a figure of the limit cycle as yaw over lateral displacement in every engine, and of its creep forces over a
     period."""
     cycles: dict[str, Orbit] = {engine: result.detail for engine, result in cycles_by_engine.items()}

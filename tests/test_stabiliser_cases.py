@@ -84,7 +84,7 @@ def test_figure_draws_from_saved_data(measured):
 
 
 def test_exudyns_limit_stops_would_be_silent(monkeypatch, tmp_path):
-    monkeypatch.setattr(exudyn, "_add_pitch_spring", hard._limit_stop)
+    monkeypatch.setattr(exudyn, "_add_pitch_spring", hard._add_limit_stop)
     edge = next(one for one in hard.CASES if one.name == "edge of a dead band")
     assert judge(edge, "exudyn", tmp_path).word == "SILENT"
 

@@ -66,7 +66,7 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
     """
     from models.core.finding import findings_as_dicts, merged_findings
     from models.systems import run as run_system
-    from studies.command.asked import findings_of, plan_of
+    from studies.command.asked import input_findings_of, plan_module_of
     from studies.command.waiting import progress_bar
     from twinrig.result import Result
 
@@ -75,8 +75,8 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
     _check_run_options(loaded, how, options)
     chosen, checked = _engines(loaded, engine, options["engine"].default == "")
     with _library_messages(loaded):
-        plan_of(loaded).check(loaded, checked)
-        doubtful = findings_as_dicts(merged_findings(findings_of(loaded)))
+        plan_module_of(loaded).check(loaded, checked)
+        doubtful = findings_as_dicts(merged_findings(input_findings_of(loaded)))
         with progress_bar(f"{loaded.title}: {chosen or loaded.system}", loaded.system):
             answer = run_system(loaded, chosen, error=error, **how)
     answer.data.attrs["queries"] = json.dumps(doubtful)
@@ -110,10 +110,10 @@ def _check_run_options(scene: Any, run_options: Mapping[str, Any], options: Mapp
 
 def _engines(scene: Any, requested_engine: str, optional: bool) -> tuple[str, tuple[str, ...]]:
     """The engine of a run ("" if the system chooses it), and the engines for which the scene is checked."""
-    from studies.command.asked import engines_of
+    from studies.command.asked import requested_engines
 
     named = requested_engine or getattr(getattr(scene, "run", None), "engine", None) or None
-    engines = engines_of(named, scene.system, "engine")
+    engines = requested_engines(named, scene.system, "engine")
     if requested_engine and len(engines) != 1:
         allowed = "a result is of one engine: run each, and lay two beside each other with twinrig.compare"
         raise InputError("engine", "", requested_engine, allowed, engines)
@@ -225,13 +225,13 @@ def price(
     """
     from models.advice.price.recommendation import price as recommended
     from models.advice.price.text import as_dict, recommendation_lines
-    from studies.command.asked import engines_of
+    from studies.command.asked import requested_engines
     from studies.command.waiting import progress_bar
     from twinrig.report import Report
 
     loaded = load(scene, set).checked
     with _library_messages(loaded):
-        engines = engines_of(engine, loaded.system, "engine")
+        engines = requested_engines(engine, loaded.system, "engine")
         with progress_bar("runs of every engine in ever finer steps", loaded.system):
             answer = recommended(loaded, tolerance, _channels_in_words(quantity), engines)
     return Report(tuple(recommendation_lines(answer)), as_dict(answer), answer)
@@ -264,12 +264,12 @@ def choose(
     from tempfile import TemporaryDirectory
 
     from models.core.told import summary_with_errors
-    from studies.command.asked import checked_study, engines_of
+    from studies.command.asked import checked_study, requested_engines
     from studies.command.waiting import progress_bar
     from twinrig.report import Report
 
     loaded = _scene_for_choice(load(scene, set), quantities, tolerance).checked
-    engines = engines_of(engine, loaded.system, "engine")
+    engines = requested_engines(engine, loaded.system, "engine")
     with _library_messages(loaded), TemporaryDirectory() as temporary:
         study = checked_study(loaded, engines)
         result_folder = _new_folder(folder, "choice") if folder is not None else Path(temporary)

@@ -24,7 +24,7 @@ from studies.command.differences import ResultQuantity
 TIME_AXIS = "time [s]"
 DOUBTFUL_CORRELATION = 0.5
 """Correlation of run and measurement below which a time shift is in doubt."""
-SHOWN_CHANNELS = 4
+SHOWN_CHANNEL_COUNT = 4
 """Number of channels in the figure, those with the largest relative errors."""
 TABLE_HEADINGS = ("channel", "unit", "rms error", "relative", "peak error", "at [s]", "stated error")
 
@@ -165,7 +165,9 @@ def overlay_of_run(
     engines = (
         [str(engine) for engine in saved_run.data.coords["engine"].values] if "engine" in saved_run.data.coords else []
     )
-    named = {name: channel for channel in source.channels for name in _channels_by_engine(channel.name, engines, ours)}
+    named = {
+        name: channel for channel in source.channels for name in _matching_run_channels(channel.name, engines, ours)
+    }
     if not named:
         theirs = [channel.name for channel in source.channels]
         name = next((other for other in theirs if suggestion_phrase(other, tuple(ours))), theirs[0] if theirs else None)
@@ -173,7 +175,9 @@ def overlay_of_run(
     doubts = list[str]()
     pairs = {name: _channel_pair(source, channel, ours[name], doubts) for name, channel in named.items()}
     moved_by = time_shift(list(pairs.values())) if time_shift_seconds is None else TimeShift(time_shift_seconds, np.nan)
-    matches = [_channel_match(name, pair, ours[name].unit, moved_by.seconds, saved_run) for name, pair in pairs.items()]
+    matches = [
+        _compared_channel(name, pair, ours[name].unit, moved_by.seconds, saved_run) for name, pair in pairs.items()
+    ]
     complete = [match for match in matches if match is not None]
     if not complete:
         raise InputError(
@@ -183,7 +187,7 @@ def overlay_of_run(
     return MeasurementOverlay(moved_by, sorted(complete, key=lambda channel_match: -channel_match.relative), notes)
 
 
-def _channels_by_engine(name: str, engines: list[str], run_quantities: Mapping[str, ResultQuantity]) -> list[str]:
+def _matching_run_channels(name: str, engines: list[str], run_quantities: Mapping[str, ResultQuantity]) -> list[str]:
     """Names of the run's channels to compare with a measured channel: its own name, or this name followed by the name
     of an engine."""
     if name in run_quantities:
@@ -198,7 +202,7 @@ def _missing_channel_notes(
 ) -> Iterator[str]:
     """Yield a note on each measured channel that the run does not have, with the most similar name of the run."""
     for channel in measurement_source.channels:
-        if not _channels_by_engine(channel.name, engines, run_quantities):
+        if not _matching_run_channels(channel.name, engines, run_quantities):
             yield (
                 f"not compared: {channel.name!r} is no channel of the "
                 f"run{suggestion_phrase(channel.name, tuple(run_quantities))}"
@@ -233,7 +237,7 @@ def _channel_pair(
     )
 
 
-def _channel_match(
+def _compared_channel(
     channel_name: str, channel_pair: ChannelPair, channel_unit: str, time_shift_seconds: float, saved_run: Result
 ) -> ChannelComparison | None:
     """Comparison of a channel at the measured times within the run, at which the run is interpolated by a cubic spline;
@@ -314,7 +318,7 @@ def draw_overlay(measurement_overlay: MeasurementOverlay, title: str, figure_pat
     difference."""
     from models.drawing.figures import BLUE, DARK, VERMILION, add_heading, save, subplots
 
-    shown = measurement_overlay.matches[:SHOWN_CHANNELS]
+    shown = measurement_overlay.matches[:SHOWN_CHANNEL_COUNT]
     figure, axes = subplots(2, len(shown), figsize=(3.6 * len(shown) + 1.0, 5.4), sharex="col", squeeze=False)
     for (top, error_axis), match in zip(axes.T, shown, strict=True):
         unit = match.unit or "-"

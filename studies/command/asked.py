@@ -54,14 +54,14 @@ def scene_path(scene_name: str) -> Path:
 
 def checked_study(scene: Any, engines: tuple[str, ...]) -> Any:
     """The module of a scene's study, after all checks that are possible before a run; raises InputError."""
-    module = study_of(scene)
-    plan_of(scene).check(scene, engines)
+    module = study_module_of(scene)
+    plan_module_of(scene).check(scene, engines)
     if hasattr(module, "check"):
         module.check(scene, engines)
     return module
 
 
-def check_by_any(scene: Any, engines: tuple[str, ...]) -> None:
+def check_for_any_engine(scene: Any, engines: tuple[str, ...]) -> None:
     """Raise InputError if no engine can run the scene. If only some engines refuse it, nothing is raised."""
     try:
         checked_study(scene, engines)
@@ -78,21 +78,21 @@ def _is_runnable(scene: Any, engine: str) -> bool:
     return True
 
 
-def needs_no_extras(scene: Any, engines: tuple[str, ...], study_module: Any) -> bool:
+def runs_without_extras(scene: Any, engines: tuple[str, ...], study_module: Any) -> bool:
     """Whether a study runs without workers, unit conversion and code of the user."""
-    code = getattr(plan_of(scene), "user_code", lambda scene: "")(scene)
+    code = getattr(plan_module_of(scene), "user_code", lambda scene: "")(scene)
     shared = hasattr(study_module, "BLOCKS_FOLDER") or scene.system == "measured"
     return not (code or shared or any(":" in engine for engine in engines))
 
 
-def plan_of(scene: Any) -> Any:
+def plan_module_of(scene: Any) -> Any:
     """The module that describes and checks the scenes of the scene's system."""
     return import_module(KNOWN_SYSTEMS[scene.system].plan)
 
 
-def findings_of(scene: Any) -> tuple[Finding, ...]:
+def input_findings_of(scene: Any) -> tuple[Finding, ...]:
     """Findings of doubtful input of a scene, before any run; raises InputError for impossible input."""
-    look = getattr(plan_of(scene), "findings", None)
+    look = getattr(plan_module_of(scene), "findings", None)
     unended = (
         () if scene.system == "measured" else _unfinished_file_notes(scene)
     )  # whose files are remarked on as recordings
@@ -105,7 +105,7 @@ def doubt_lines(scene: Any) -> list[str]:
 
     checks = (*get_args(Query), "exchanged", "shift")
     with suppress(InputError):
-        return finding_lines(finding for finding in findings_of(scene) if finding.check in checks)
+        return finding_lines(finding for finding in input_findings_of(scene) if finding.check in checks)
     return []
 
 
@@ -136,7 +136,7 @@ def _csv_files_of_table(scene_table: Any) -> Iterator[str]:
         yield scene_table
 
 
-def engines_of(engine_option: str | None, system_name: str, option_name: str = "--engine") -> tuple[str, ...]:
+def requested_engines(engine_option: str | None, system_name: str, option_name: str = "--engine") -> tuple[str, ...]:
     """The engines for a value of ``--engine`` and a system; none for a system without engines. option_name : of the
     option, for messages."""
     engines = KNOWN_SYSTEMS[system_name].engines
@@ -147,14 +147,14 @@ def engines_of(engine_option: str | None, system_name: str, option_name: str = "
     if engine_option is None or engine_option == "all":
         return engines
     if ":" in engine_option:
-        return _registered_outside(engine_option, system_name, option_name)
+        return _register_user_engine(engine_option, system_name, option_name)
     named = (*engines, *KNOWN_SYSTEMS[system_name].on_request)
     if engine_option not in named:
         raise InputError(option_name, "", engine_option, "no such engine", (*named, "all"))
     return (engine_option,)
 
 
-def _registered_outside(class_path: str, system_name: str, option_name: str) -> tuple[str, ...]:
+def _register_user_engine(class_path: str, system_name: str, option_name: str) -> tuple[str, ...]:
     """Register an engine or integrator of the user, ``module:Class``; returns its name."""
     if system_name != DEFAULT_SYSTEM:
         raise InputError(
@@ -166,7 +166,7 @@ def _registered_outside(class_path: str, system_name: str, option_name: str) -> 
     return (class_path,)
 
 
-def study_of(scene: Any) -> Any:
+def study_module_of(scene: Any) -> Any:
     """The module of a scene's study; raises InputError for an unknown study, another system, and options that the study
     does not have."""
     from models.core.strict import read

@@ -17,11 +17,11 @@ from models.core.whole_files import whole_file
 from studies.command.differences import QuantityDifference, ResultQuantity
 
 RESULT_SUFFIXES = (".nc", ".csv")
-PRINTED_QUANTITIES = 20
+PRINTED_QUANTITY_LIMIT = 20
 """Number of quantities that are printed, those that differ most; ``compare.csv`` has all."""
-KIND_ATTRIBUTES = ("system", "mode")
+RUN_KIND_ATTRIBUTES = ("system", "mode")
 """Attributes of a result that must be equal in both results."""
-EQUAL_POSITIONS = 1e-9
+EQUAL_POSITION_TOLERANCE = 1e-9
 """Difference of two grid positions, divided by the largest position, below which they are equal."""
 
 
@@ -46,7 +46,7 @@ def compare_runs(
 ) -> tuple[list[QuantityDifference], list[str]]:
     """Differences of all quantities of two results in memory, and notes on quantities that occur in only one;
     ``run_names`` are the results' names in messages."""
-    a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first_run, second_run))
+    a, b = (dict(_with_stated_errors(run, channels_of(run.data))) for run in (first_run, second_run))
     differences = [_quantity_difference(key, a[key], b[key], run_names[1]) for key in a if key in b]
     return _sorted_by_share(differences, *run_names), _notes_on_missing("", (run_names[0], a), (run_names[1], b))
 
@@ -140,13 +140,13 @@ def _result_of_file(result_path: Path) -> Result | None:
 
 def _quantities_of_file(result_path: Path) -> Iterator[tuple[str, ResultQuantity]]:
     """Yield name and values of each quantity of a file, with the error that its result states."""
-    yield from _with_errors(
+    yield from _with_stated_errors(
         _result_of_file(result_path),
         channels_of(load(result_path).data) if result_path.suffix == ".nc" else _quantities_of_table(result_path),
     )
 
 
-def _with_errors(
+def _with_stated_errors(
     saved_run: Result | None, quantities: Iterable[tuple[str, ResultQuantity]]
 ) -> Iterator[tuple[str, ResultQuantity]]:
     """Yield name and values of each quantity of a result, with the error that the result states for the channel, if
@@ -160,11 +160,11 @@ def _with_errors(
 def channels_of(dataset: Any) -> Iterator[tuple[str, ResultQuantity]]:
     """Yield name and values of the numeric channels of a dataset over time or another axis. A channel with further axes
     gives one quantity for each entry of these."""
-    kinds = ", ".join(str(dataset.attrs[kind]) for kind in KIND_ATTRIBUTES if kind in dataset.attrs)
+    kinds = ", ".join(str(dataset.attrs[kind]) for kind in RUN_KIND_ATTRIBUTES if kind in dataset.attrs)
     for name, channel in dataset.data_vars.items():
         if channel.dtype.kind not in "fiu" or channel.size == 0:
             continue
-        dimension = _dimension_along(channel)
+        dimension = _compared_dimension(channel)
         axis_name, grid = _grid_of_dimension(channel, dimension)
         other_dims = [dim for dim in channel.dims if dim != dimension]
         for index in np.ndindex(*(channel.sizes[dim] for dim in other_dims)):
@@ -178,7 +178,7 @@ def channels_of(dataset: Any) -> Iterator[tuple[str, ResultQuantity]]:
             yield ", ".join((str(name), *labels)), quantity
 
 
-def _dimension_along(channel: Any) -> Any:
+def _compared_dimension(channel: Any) -> Any:
     """Dimension along which a channel is compared: time, or else the longest dimension with numbers, or nothing, as
     coordinates."""
     numbered = [dim for dim in channel.dims if dim not in channel.coords or channel[dim].dtype.kind in "fiu"]
@@ -247,7 +247,7 @@ def _quantity_difference(
             raise InputError(
                 file_name, quantity_name, other, f"has other rows than the first, which has {label!r} there"
             )
-    near = EQUAL_POSITIONS * np.abs(first_quantity.grid).max(initial=0.0)
+    near = EQUAL_POSITION_TOLERANCE * np.abs(first_quantity.grid).max(initial=0.0)
     if first_quantity.grid.shape == second_quantity.grid.shape and np.allclose(
         first_quantity.grid, second_quantity.grid, rtol=0.0, atol=near
     ):
@@ -299,7 +299,7 @@ def _difference_in_time(
         raise InputError(file_name, quantity_name, None, "has no times in common with the first")
     common_times = coarse.grid[is_within]
     pair = CubicSpline(fine.grid, fine.values)(common_times), coarse.values[is_within]
-    extent = _common_extent(common_times, first_quantity.grid, second_quantity.grid)
+    extent = _common_times_phrase(common_times, first_quantity.grid, second_quantity.grid)
     note = f"on {len(common_times)} common rows, the denser run by a cubic spline{extent}"
     values_of_both = pair if fine is first_quantity else pair[::-1]
     return QuantityDifference(
@@ -313,7 +313,7 @@ def _difference_in_time(
     )
 
 
-def _common_extent(common_times: np.ndarray, *times_of_runs: np.ndarray) -> str:
+def _common_times_phrase(common_times: np.ndarray, *times_of_runs: np.ndarray) -> str:
     """Phrase on the compared times (s) if one run begins later or ends earlier than the other; else ""."""
     begin, end = (float(extreme(np.concatenate(times_of_runs))) for extreme in (np.min, np.max))
     spacing = min(float(np.diff(grid).max()) for grid in times_of_runs)
@@ -353,10 +353,10 @@ def report(first_path: Path, second_path: Path, output_folder: Path) -> dict[str
 
 def comparison_lines(differences: list[QuantityDifference], notes: list[str]) -> list[str]:
     """Lines for the screen: the quantities with the largest differences, and notes."""
-    return [*_file_lines(differences), *(f"  {note}" for note in notes)]
+    return [*_quantity_lines(differences), *(f"  {note}" for note in notes)]
 
 
-def _file_lines(differences: list[QuantityDifference]) -> list[str]:
+def _quantity_lines(differences: list[QuantityDifference]) -> list[str]:
     differ = [difference for difference in differences if difference.largest > 0.0]
     notes = [
         f"  {note}"
@@ -364,7 +364,7 @@ def _file_lines(differences: list[QuantityDifference]) -> list[str]:
     ]
     if not differ:
         return [f"  all {len(differences)} quantities are the same to the last bit", *notes]
-    shown = [difference for difference in differences[:PRINTED_QUANTITIES] if difference.largest > 0.0]
+    shown = [difference for difference in differences[:PRINTED_QUANTITY_LIMIT] if difference.largest > 0.0]
     equal_count, not_shown = len(differences) - len(differ), len(differ) - len(shown)
     return [
         f"  {'quantity':<44} {'largest':>11} {'rms':>11} {'unit':<9} {'share':>8}  where it is largest",

@@ -23,7 +23,7 @@ def exit_with_message(message: str, exit_code: int) -> NoReturn:
     sys.exit(exit_code)
 
 
-def profiled_work(is_profiled: bool) -> Callable[[StudyRun], StudyRun]:
+def profiling_wrapper(is_profiled: bool) -> Callable[[StudyRun], StudyRun]:
     """Wrapper for the function that runs a study: with ``is_profiled``, its summary also states where computing time
     was spent; without, the function is unchanged."""
     if not is_profiled:
@@ -34,7 +34,7 @@ def profiled_work(is_profiled: bool) -> Callable[[StudyRun], StudyRun]:
     return lambda work: partial(profiler.run_profiled, work)
 
 
-def finish(
+def run_and_print_summary(
     run_study: StudyRun,
     output_folder: Path,
     as_json: bool,
@@ -70,7 +70,7 @@ def finish(
         sys.exit(1)
 
 
-def folder_of(
+def results_folder_of(
     scene_name: str,
     blocks_folder: str | None,
     study_name: str,

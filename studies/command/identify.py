@@ -52,7 +52,7 @@ def identify(
             return uncertainty(fit(problem, store, report_progress, executor=pool), pool)
 
 
-def profiles_of(
+def likelihood_profiles_of(
     scene: Any,
     uncertainty: Uncertainty,
     with_all_profiles: bool = False,
@@ -112,8 +112,8 @@ def report(
         report_progress=report_progress,
         **identify_options,
     )
-    drawn = list(profiles_of(scene, known, with_all_profiles, report_progress))
-    answer = identification_record(known, drawn)
+    drawn = list(likelihood_profiles_of(scene, known, with_all_profiles, report_progress))
+    answer = identification_as_dict(known, drawn)
     write_whole(output_folder / "identify.json", json.dumps(answer, indent=1) + "\n")
     draw_fit(known, f"{measurement_path.name} by {scene.title}", output_folder / "identify.png")
     return {
@@ -126,7 +126,7 @@ def report(
     }
 
 
-def identification_record(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) -> dict[str, Any]:
+def identification_as_dict(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) -> dict[str, Any]:
     """Estimates, uncertainty and likelihood profiles as plain values for JSON; None for a missing standard error."""
     solved, names = uncertainty.fit, [parameter.name for parameter in uncertainty.fit.problem.parameters]
     return {
@@ -141,7 +141,7 @@ def identification_record(uncertainty: Uncertainty, profiles: Sequence[Likelihoo
                 names, solved.values, uncertainty.deviations, uncertainty.is_determined, solved.at_bound, strict=True
             )
         },
-        "correlation": {"of": names, "rows": correlation(uncertainty).tolist()},
+        "correlation": {"of": names, "rows": estimate_correlation(uncertainty).tolist()},
         "combinations": [
             {"standard error": error, "direction": dict(zip(names, vector.tolist(), strict=True))}
             for error, vector in uncertainty.combinations()
@@ -162,7 +162,7 @@ def identification_record(uncertainty: Uncertainty, profiles: Sequence[Likelihoo
     }
 
 
-def correlation(uncertainty: Uncertainty) -> np.ndarray:
+def estimate_correlation(uncertainty: Uncertainty) -> np.ndarray:
     """Correlation matrix (p, p) of the parameter estimates; 0 for estimates at a bound."""
     size = np.sqrt(np.clip(np.diag(uncertainty.covariance), 0.0, None))
     outer = np.outer(size, size)
@@ -227,10 +227,14 @@ def clock_delay(uncertainty: Uncertainty) -> float:
         for row, values in zip(problem.predicted(start), measured, strict=True)
     ]
     shift = time_shift(pairs).seconds
-    return shift if _mean_distance(pairs, shift) * SHIFT_IMPROVEMENT < _mean_distance(pairs, 0.0) else 0.0
+    return (
+        shift
+        if _mean_channel_difference(pairs, shift) * SHIFT_IMPROVEMENT < _mean_channel_difference(pairs, 0.0)
+        else 0.0
+    )
 
 
-def _mean_distance(channel_pairs: Sequence[ChannelPair], time_shift_seconds: float) -> float:
+def _mean_channel_difference(channel_pairs: Sequence[ChannelPair], time_shift_seconds: float) -> float:
     """Mean over channels of the rms difference of run and measurement divided by the measurement's standard deviation,
     with the measurement shifted earlier by a time (s)."""
     shares = []

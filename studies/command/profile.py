@@ -17,7 +17,7 @@ SAMPLING_PERIOD = 0.004
 """Time (s) between two samples of the call stack."""
 PYTHON_START_KIND, IMPORTS_KIND, KERNELS_KIND = "start of Python", "imports", "compiling and loading kernels"
 FIGURES_KIND, SAVING_KIND, OTHER_KIND = "figures", "saving", "everything else"
-OUTSIDE_ENGINES = "marching beside the engines"
+OUTSIDE_ENGINES_KIND = "marching beside the engines"
 """Label of time spent in a controller, in wheels with their own steps, or in equations that belong to no engine."""
 WORK_KIND_OF_LIBRARY = {
     "numba": KERNELS_KIND,
@@ -32,7 +32,7 @@ WORK_KIND_OF_LIBRARY = {
     "backends": SAVING_KIND,
 }
 """Kind of work that a call within a library or a source folder belongs to."""
-ENGINES = ("exudyn", "mujoco", "reference")
+ENGINE_NAMES = ("exudyn", "mujoco", "reference")
 MARCH_FUNCTIONS = frozenset(
     (
         *("march", "march_adaptively", "solve", "run", "rollout", "SolveDynamic"),
@@ -87,10 +87,10 @@ def kind_of_work(innermost_frame: FrameType) -> str:
         if (name, path.stem) == ("save", "result") or path.stem == "whole_files":
             return SAVING_KIND
         forces = forces or name in FORCE_FUNCTIONS
-        within = _engine(path)
+        within = _engine_of_source(path)
         engine = engine or within
         if name in MARCH_FUNCTIONS and (within or path.stem == "march"):
-            work_part = f"marching in {engine}" if engine else OUTSIDE_ENGINES
+            work_part = f"marching in {engine}" if engine else OUTSIDE_ENGINES_KIND
             return f"forces asked for by {engine}" if engine and forces else work_part
     return f"building in {engine}" if engine else OTHER_KIND
 
@@ -102,11 +102,11 @@ def _calls_of_stack(innermost_frame: FrameType | None) -> Iterator[tuple[str, Pu
         innermost_frame = innermost_frame.f_back
 
 
-def _engine(source_path: PurePath) -> str:
+def _engine_of_source(source_path: PurePath) -> str:
     """Name of the engine that a source file belongs to, in its own package or in ``models/engines``; else ""."""
-    if source_path.parent.name in ENGINES:
+    if source_path.parent.name in ENGINE_NAMES:
         return source_path.parent.name
-    named = (engine for engine in ENGINES if engine in source_path.stem)
+    named = (engine for engine in ENGINE_NAMES if engine in source_path.stem)
     return next(named, "") if source_path.parent.name == "engines" else ""
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from studies.command.asked import load_scene, needs_no_extras, study_of
+from studies.command.asked import load_scene, runs_without_extras, study_module_of
 from studies.command.waiting import CompilationTimer
 
 COMPILATION_SECONDS = 1.0
@@ -53,7 +53,7 @@ def second_process_compiles(
     own, or code of the user's.
     """
     idle = len(engines) > 1 and (os.cpu_count() or 1) > 1 and sys.stderr.isatty()
-    if not idle or not needs_no_extras(scene, engines, study_of(scene)):
+    if not idle or not runs_without_extras(scene, engines, study_module_of(scene)):
         yield
         return
     with TemporaryDirectory() as folder:
@@ -70,7 +70,7 @@ def run_for_kernels(scene_name: str, key_changes: list[str], engine: str, with_e
     """Run a scene in one engine, which compiles its kernels; results are saved in ``output_folder``. The scene is
     checked by the first process."""
     scene = load_scene(scene_name, key_changes).model_copy(update={"error": with_error})
-    study_of(scene).run(scene, (engine,), Path(output_folder), lambda text, share: None)
+    study_module_of(scene).run(scene, (engine,), Path(output_folder), lambda text, share: None)
 
 
 if __name__ == "__main__":

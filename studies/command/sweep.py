@@ -32,7 +32,7 @@ from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import EnsembleProgress as Done
 from models.ensemble.store import Arrays, checksum_of_sources, exclusive_folder, named_files
 from models.ensemble.workers import Crew
-from studies.command.asked import STUDIES_FOLDER, checked_study, engines_of, load_scene, scene_path
+from studies.command.asked import STUDIES_FOLDER, checked_study, load_scene, requested_engines, scene_path
 from studies.command.summary_numbers import Columns, has_several_values, present_numbers, summary_scalars
 
 if TYPE_CHECKING:
@@ -50,16 +50,16 @@ PointRecord = dict[str, Any]
 class SweepJob:
     """Ensemble job (see ``models.ensemble.runner``) of a sweep: point i is the scene with the i-th value of the key.
 
-    error : whether the error of each point is estimated.
+    with_error : whether the error of each point is estimated.
     """
 
-    scene: str
-    changes: tuple[str, ...]
-    key: str
-    values: tuple[Any, ...]
+    scene_name: str
+    key_changes: tuple[str, ...]
+    swept_key: str
+    swept_values: tuple[Any, ...]
     engine: str | None
-    folder: Path
-    error: bool = True
+    output_folder: Path
+    with_error: bool = True
 
     def __call__(self, point_numbers: range) -> Arrays:
         """Array "record" (n,): the record of each of the n points as JSON text."""
@@ -67,17 +67,19 @@ class SweepJob:
 
     def prepared_point(self, point_number: int) -> tuple[Any, tuple[str, ...], Any]:
         """Scene, engines and study of a point of the sweep; raises InputError if the point cannot be run."""
-        scene = load_scene(self.scene, [*self.changes, f"{self.key}={_value_text(self.values[point_number])}"])
-        scene = scene.model_copy(update={"error": scene.error and self.error})
+        scene = load_scene(
+            self.scene_name, [*self.key_changes, f"{self.swept_key}={_value_text(self.swept_values[point_number])}"]
+        )
+        scene = scene.model_copy(update={"error": scene.error and self.with_error})
         engine = self.engine or getattr(getattr(scene, "run", None), "engine", None)
-        engines = engines_of(engine, scene.system)
+        engines = requested_engines(engine, scene.system)
         return scene, engines, checked_study(scene, engines)
 
     def check(self) -> Any:
         """The scene of the first point that can be run; if every point is refused, the InputError of the first is
         raised."""
         first: InputError | None = None
-        for i in range(len(self.values)):
+        for i in range(len(self.swept_values)):
             try:
                 return self.prepared_point(i)[0]
             except InputError as error:
@@ -91,7 +93,7 @@ class SweepJob:
         try:
             scene, engines, study = self.prepared_point(point_number)
             scene = scene.model_copy(update={"workers": 1, "cluster": None})
-            with complete_folder(self.folder / RUNS_FOLDER / f"{point_number:04d}") as run_folder:
+            with folder_when_complete(self.output_folder / RUNS_FOLDER / f"{point_number:04d}") as run_folder:
                 summary = study.run(scene, engines, run_folder, lambda text, part: None)
         except (InputError, RunFailed) as error:
             return _failed_record(error)
@@ -100,15 +102,15 @@ class SweepJob:
 
     def facts(self) -> dict[str, Any]:
         """Facts on which the results of all points depend: the scene's table, the files that it names, and the code."""
-        path = scene_path(self.scene)
-        table = changed_tables(path, self.changes)
+        path = scene_path(self.scene_name)
+        table = changed_tables(path, self.key_changes)
         return {
-            "sweep": self.key,
-            "values": list(self.values),
+            "sweep": self.swept_key,
+            "values": list(self.swept_values),
             "engine": self.engine,
-            "error": self.error,
+            "error": self.with_error,
             "scene": table,
-            "files": named_files([table, self.values, self.engine], path.parent),
+            "files": named_files([table, self.swept_values, self.engine], path.parent),
             "code of studies": checksum_of_sources(STUDIES_FOLDER),
         }
 
@@ -122,7 +124,7 @@ def _failed_record(failure_reason: object) -> PointRecord:
 
 
 @contextmanager
-def complete_folder(final_folder: Path) -> Iterator[Path]:
+def folder_when_complete(final_folder: Path) -> Iterator[Path]:
     """Context that yields a temporary folder to write into. It gets its final name only when it is complete, and then
     replaces an older folder of this name."""
     partial_folder = final_folder.with_name(f".{final_folder.name}.{os.getpid()}.part")
@@ -212,28 +214,29 @@ def run(sweep_job: SweepJob, report_progress: Callable[[str, float], None], work
     """Run all unfinished points of a sweep by workers, then save its table and figures; returns the summary."""
     from studies.command.sweep_figure import draw_sweep  # workers, which import this file, draw nothing
 
-    with exclusive_folder(sweep_job.folder):
-        for partial_folder in (sweep_job.folder / RUNS_FOLDER).glob(".*.part"):
+    with exclusive_folder(sweep_job.output_folder):
+        for partial_folder in (sweep_job.output_folder / RUNS_FOLDER).glob(".*.part"):
             shutil.rmtree(partial_folder, ignore_errors=True)  # of a process that was killed while it wrote
         records = _records_of_points(sweep_job, report_progress, worker_crew)
         swept = _sweep_columns(sweep_job, records)
-        _save_sweep(sweep_job.folder, swept)
-        pages = draw_sweep(swept, sweep_job.folder)
+        _save_sweep(sweep_job.output_folder, swept)
+        pages = draw_sweep(swept, sweep_job.output_folder)
     reasons = {
-        f"{sweep_job.key}={value}{f', {who}' if who else ''}": reason
-        for value, failed in zip(sweep_job.values, swept.failures, strict=True)
+        f"{sweep_job.swept_key}={value}{f', {who}' if who else ''}": reason
+        for value, failed in zip(sweep_job.swept_values, swept.failures_of_points, strict=True)
         for who, reason in failed.items()
     }
     return {
-        "scene": f"{scene_path(sweep_job.scene).stem} over {sweep_job.key}, {len(sweep_job.values)} points",
+        "scene": f"{scene_path(sweep_job.scene_name).stem} over {sweep_job.swept_key}, "
+        f"{len(sweep_job.swept_values)} points",
         "failed": reasons,
-        "folder": str(sweep_job.folder),
-        "values": list(sweep_job.values),
-        "numbers": swept.columns,
-        "table": _table_lines(swept.columns, pages),
+        "folder": str(sweep_job.output_folder),
+        "values": list(sweep_job.swept_values),
+        "numbers": swept.columns_by_quantity,
+        "table": _table_lines(swept.columns_by_quantity, pages),
         "results": {
-            f"{sweep_job.key}={value} {name}".rstrip(): run
-            for value, results in zip(sweep_job.values, swept.results, strict=True)
+            f"{sweep_job.swept_key}={value} {name}".rstrip(): run
+            for value, results in zip(sweep_job.swept_values, swept.results_of_points, strict=True)
             for name, run in results.items()
         },
     }
@@ -249,14 +252,20 @@ def _sweep_columns(sweep_job: SweepJob, point_records: list[PointRecord]) -> "Sw
     failures = [record["failed"] for record in point_records]
     results: list[told.Results] = [told.results_with_attributes(record["results"]) for record in point_records]
     return SweepResults(
-        sweep_job.scene, sweep_job.key, sweep_job.values, columns, failures, results, _unit_of_key(sweep_job)
+        sweep_job.scene_name,
+        sweep_job.swept_key,
+        sweep_job.swept_values,
+        columns,
+        failures,
+        results,
+        _unit_of_key(sweep_job),
     )
 
 
 def _unit_of_key(sweep_job: SweepJob) -> str:
     """Unit of the swept key; "-" if the key has no unit, "SI" if no table describes it."""
-    owner: Any = load_scene(sweep_job.scene, list(sweep_job.changes))
-    *tables, name = sweep_job.key.split(".")
+    owner: Any = load_scene(sweep_job.scene_name, list(sweep_job.key_changes))
+    *tables, name = sweep_job.swept_key.split(".")
     for table in tables:
         owner = owner.get(table) if isinstance(owner, Mapping) else getattr(owner, table, None)
     known = type(owner).model_fields.get(name) if isinstance(owner, BaseModel) else None
@@ -280,17 +289,30 @@ def _records_of_points(
         return _json_array(_failed_record(loss_reason) for _ in lost_points)
 
     if worker_crew.cluster is not None:  # whose workers compute in folders of their own
-        sweep_job = replace(sweep_job, folder=sweep_job.folder.resolve(), scene=_absolute_path(sweep_job.scene))
+        sweep_job = replace(
+            sweep_job, output_folder=sweep_job.output_folder.resolve(), scene_name=_absolute_path(sweep_job.scene_name)
+        )
     with worker_crew.at_work(
-        len(sweep_job.values), sweep_job.folder, *([Path(sweep_job.scene)] if Path(sweep_job.scene).is_file() else [])
+        len(sweep_job.swept_values),
+        sweep_job.output_folder,
+        *([Path(sweep_job.scene_name)] if Path(sweep_job.scene_name).is_file() else []),
     ) as pool:
         text_records = run_paths(
-            sweep_job, len(sweep_job.values), sweep_job.folder / RECORDS_FOLDER, pool, Blocks(1), tell, lost
+            sweep_job,
+            len(sweep_job.swept_values),
+            sweep_job.output_folder / RECORDS_FOLDER,
+            pool,
+            Blocks(1),
+            tell,
+            lost,
         )["record"]
     records = [json.loads(str(text_of_record)) for text_of_record in text_records]
     if not any(record["numbers"] or record["failed"] for record in records):
         raise InputError(
-            "--sweep", sweep_job.key, None, f"the study of {sweep_job.scene} gives no numbers to draw over it"
+            "--sweep",
+            sweep_job.swept_key,
+            None,
+            f"the study of {sweep_job.scene_name} gives no numbers to draw over it",
         )
     return records
 
@@ -303,28 +325,36 @@ def _absolute_path(scene_name: str) -> str:
 def _save_sweep(output_folder: Path, sweep_results: "SweepResults") -> None:
     """Save the results of a sweep as ``sweep.csv`` and ``sweep.json``; equal points give equal bytes."""
     errors, broken = (
-        [_largest_error(results) for results in sweep_results.results],
-        [_broken_assumptions_text(results) for results in sweep_results.results],
+        [_largest_error(results) for results in sweep_results.results_of_points],
+        [_broken_assumption_text(results) for results in sweep_results.results_of_points],
     )
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([sweep_results.key, *sweep_results.columns, "failed", "largest error [-]", "broken assumptions"])
-    for i, value in enumerate(sweep_results.values):
+    writer.writerow(
+        [
+            sweep_results.swept_key,
+            *sweep_results.columns_by_quantity,
+            "failed",
+            "largest error [-]",
+            "broken assumptions",
+        ]
+    )
+    for i, value in enumerate(sweep_results.swept_values):
         failed = "; ".join(
             f"{engine_name}: {reason}" if engine_name else reason
-            for engine_name, reason in sweep_results.failures[i].items()
+            for engine_name, reason in sweep_results.failures_of_points[i].items()
         )
         writer.writerow(
-            [value, *(column[i] for column in sweep_results.columns.values()), failed, errors[i], broken[i]]
+            [value, *(column[i] for column in sweep_results.columns_by_quantity.values()), failed, errors[i], broken[i]]
         )
     write_whole(output_folder / "sweep.csv", text.getvalue().encode())
     content = {
-        "key": sweep_results.key,
-        "values": list(sweep_results.values),
-        "numbers": sweep_results.columns,
-        "failed": sweep_results.failures,
+        "key": sweep_results.swept_key,
+        "values": list(sweep_results.swept_values),
+        "numbers": sweep_results.columns_by_quantity,
+        "failed": sweep_results.failures_of_points,
     }
-    content |= {"results": [told.errors_and_assumptions(results) for results in sweep_results.results]}
+    content |= {"results": [told.errors_and_assumptions(results) for results in sweep_results.results_of_points]}
     write_whole(output_folder / "sweep.json", json.dumps(content, indent=1).encode())
 
 
@@ -336,7 +366,7 @@ def _largest_error(point_results: told.Results) -> float | None:
     )
 
 
-def _broken_assumptions_text(point_results: told.Results) -> str:
+def _broken_assumption_text(point_results: told.Results) -> str:
     """Text on assumptions that a point's results broke, each with the share of time for which it was broken."""
     breaches = [(name, breach) for name, run in point_results.items() for breach in broken_of(run)]
     return "; ".join(f"{name}: {breach.name} ({100.0 * breach.share:.2g} %)" for name, breach in breaches)

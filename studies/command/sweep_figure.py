@@ -49,32 +49,34 @@ WARNING_MARK = {
 
 @dataclass(frozen=True)
 class SweepResults:
-    """Results of a sweep of ``scene`` over ``key``, with a value, a failure record and results for each point.
+    """Results of a sweep of ``scene`` over ``swept_key``, with a value, a failure record and results for each point.
 
-    columns : numbers over the points, by name; failures : reasons of failed runs at each point, by engine; results : of
-    each point, without channels, by name; unit : of the key's values.
+    columns_by_quantity : numbers over the points, by name; failures_of_points : reasons of failed runs at each point,
+    by engine; results_of_points : of each point, without channels, by name; key_unit : of the key's values.
     """
 
     scene: str
-    key: str
-    values: tuple[Any, ...]
-    columns: Columns
-    failures: list[dict[str, str]]
-    results: Sequence[Results]
-    unit: str = "SI"
+    swept_key: str
+    swept_values: tuple[Any, ...]
+    columns_by_quantity: Columns
+    failures_of_points: list[dict[str, str]]
+    results_of_points: Sequence[Results]
+    key_unit: str = "SI"
 
     def broken_points(self, engine: str) -> list[int]:
         """Indices of the points at which a result of an engine, or of any engine for "", broke an assumption."""
         return [
             i
-            for i, results in enumerate(self.results)
+            for i, results in enumerate(self.results_of_points)
             if any(map(broken_of, _results_of_engine(results, engine).values()))
         ]
 
     def warned_points(self, engine: str) -> list[int]:
         """Indices of the points at which a result of an engine, or of any engine for "", states an error large enough
         for a warning."""
-        shown = (map(largest_estimate, _results_of_engine(results, engine).values()) for results in self.results)
+        shown = (
+            map(largest_estimate, _results_of_engine(results, engine).values()) for results in self.results_of_points
+        )
         return [i for i, worst in enumerate(shown) if any(error is not None and error.warned for error in worst)]
 
 
@@ -87,7 +89,7 @@ def _results_of_engine(point_results: Results, engine: str) -> Results:
 def draw_sweep(sweep_results: SweepResults, output_folder: Path) -> list[str]:
     """Save the figures ``sweep.png``, ``sweep-2.png``, ... of a sweep, and return their names; none if no number
     changes."""
-    changing = _changing_quantities(sweep_results.columns)
+    changing = _changing_quantities(sweep_results.columns_by_quantity)
     size, names = PANELS_ACROSS * PANELS_DOWN, list[str]()
     shown = list(changing.items())[: size * MOST_PAGES]
     for first in range(0, len(shown), size):
@@ -121,7 +123,7 @@ def _draw_page(
     sweep_results: SweepResults, shown_curves: list[tuple[str, dict[str, list[Any]]]], figure_path: Path, page_note: str
 ) -> None:
     figure, axes = panels(len(shown_curves), min(PANELS_ACROSS, len(shown_curves)), 2.3)
-    sweep_positions, ticks = _axis_positions(sweep_results.values)
+    sweep_positions, ticks = _axis_positions(sweep_results.swept_values)
     for axis, (quantity_name, curves) in zip(axes, shown_curves, strict=True):
         _draw_panel(axis, sweep_positions, quantity_name, curves, sweep_results, "o" if ticks else "o-")
         if ticks:
@@ -130,9 +132,9 @@ def _draw_page(
             axis.set_xscale("log")
         else:
             axis.locator_params(axis="x", nbins=6)
-        axis.set_xlabel(sweep_results.key if ticks else f"{sweep_results.key} [{sweep_results.unit}]")
+        axis.set_xlabel(sweep_results.swept_key if ticks else f"{sweep_results.swept_key} [{sweep_results.key_unit}]")
     legend_below(figure, *axes)
-    add_heading(figure, f"{sweep_results.scene.rpartition('/')[2]} over {sweep_results.key}: {page_note}")
+    add_heading(figure, f"{sweep_results.scene.rpartition('/')[2]} over {sweep_results.swept_key}: {page_note}")
     save(figure, figure_path)
 
 
@@ -169,7 +171,7 @@ def _draw_panel(
         axis.ticklabel_format(axis="y", useOffset=False)
     lost = [
         i
-        for i, failed in enumerate(sweep_results.failures)
+        for i, failed in enumerate(sweep_results.failures_of_points)
         if failed and any(col[i] is None for col in curves_by_engine.values())
     ]
     if lost:

@@ -37,17 +37,17 @@ def _ignore_progress(activity: str, share: float) -> None:
 
 @dataclass(frozen=True)
 class TwinOptions:
-    """Options of the command ``twin``. states : number of random states at which accelerations are compared;
-    compare_paths : whether runs in time are compared, too; tolerance (rad, m) and quantity for which the cheapest
-    settings are sought, None for no search and for all joints; controls : file of the controls in these runs; folder :
-    in which all files that a model names must lie, the model's own if None."""
+    """Options of the command ``twin``. state_count : number of random states at which accelerations are compared;
+    compare_paths : whether runs in time are compared, too; tolerance (rad, m) and quantity_name for which the cheapest
+    settings are sought, None for no search and for all joints; controls_path : file of the controls in these runs;
+    resource_folder : in which all files that a model names must lie, the model's own if None."""
 
-    states: int = STATE_COUNT
+    state_count: int = STATE_COUNT
     compare_paths: bool = True
     tolerance: float | None = None
-    quantity: str | None = None
-    controls: Path | None = None
-    folder: Path | None = None
+    quantity_name: str | None = None
+    controls_path: Path | None = None
+    resource_folder: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class ExaminedFile:
 
 
 @dataclass(frozen=True, eq=False)
-class Twins:
+class TwinResults:
     """Results of the command ``twin`` for one file or two. comparison : of the two files; path_gap : difference of
     their runs in time, None if not requested or if the files have different coordinates."""
 
@@ -122,26 +122,29 @@ def examine(
     omitted_kinds: Sequence[str],
     twin_options: TwinOptions,
     report_progress: ReportProgress = _ignore_progress,
-) -> Twins:
+) -> TwinResults:
     """Compare each model file with its builds, and both files if there are two; raises InputError if a file cannot be
     read or built.
 
     report_progress : called with the current task and the finished share of all work.
     """
-    if twin_options.states < 1:
-        raise InputError("--states", "", twin_options.states, "must be 1 or more")
-    if twin_options.quantity is not None and twin_options.tolerance is None:
-        raise InputError("--quantity", "", twin_options.quantity, "is what --tolerance is of: give both, or neither")
-    if twin_options.controls and (
+    if twin_options.state_count < 1:
+        raise InputError("--states", "", twin_options.state_count, "must be 1 or more")
+    if twin_options.quantity_name is not None and twin_options.tolerance is None:
+        raise InputError(
+            "--quantity", "", twin_options.quantity_name, "is what --tolerance is of: give both, or neither"
+        )
+    if twin_options.controls_path and (
         not twin_options.compare_paths or twin_options.tolerance is not None or len(model_paths) > 1
     ):
         allowed = "acts on paths of one file alone: leave out --no-paths, --tolerance and other files"
-        raise InputError("--controls", "", str(twin_options.controls), allowed)
-    read_files = [read(path, omitted_kinds, twin_options.folder) for path in model_paths]
+        raise InputError("--controls", "", str(twin_options.controls_path), allowed)
+    read_files = [read(path, omitted_kinds, twin_options.resource_folder) for path in model_paths]
     for file in read_files if twin_options.compare_paths else ():
         step_count_of_path(file.twin)
     tables = [
-        read_controls(twin_options.controls, file.twin.model) if twin_options.controls else None for file in read_files
+        read_controls(twin_options.controls_path, file.twin.model) if twin_options.controls_path else None
+        for file in read_files
     ]
     parts = len(model_paths) + (len(model_paths) > 1)
     examined = [
@@ -149,7 +152,7 @@ def examine(
         for i, (file, table) in enumerate(zip(read_files, tables, strict=True))
     ]
     if len(examined) < 2:
-        return Twins(tuple(examined), None)
+        return TwinResults(tuple(examined), None)
     report_progress("comparing the files", len(model_paths) / parts)
     first, second = (examined_file.file.twin for examined_file in examined)
     names = [examined_file.name for examined_file in examined]
@@ -161,7 +164,7 @@ def examine(
         if twin_options.compare_paths and comparison.acceleration_agreement is not None
         else None
     )
-    return Twins(tuple(examined), comparison, gap)
+    return TwinResults(tuple(examined), comparison, gap)
 
 
 def _report_progress(
@@ -180,7 +183,7 @@ def _examine_file(
     """Compare a model file with its builds, then its runs in time, and find its cheapest settings if requested. Each
     task counts as a third of the progress."""
     agreements = certificate(
-        model_file.twin, twin_options.states, lambda share: report_progress("comparing accelerations", share / 3)
+        model_file.twin, twin_options.state_count, lambda share: report_progress("comparing accelerations", share / 3)
     )
     explained = {
         agreement.build: removals_that_agree(model_file.twin, agreement.build)
@@ -201,7 +204,9 @@ def _examine_file(
         from models.advice.price.text import recommendation_lines as price_lines
 
         report_progress("pricing", 2 / 3)
-        price = tuple(price_lines(recommended_settings(model_file.twin, twin_options.tolerance, twin_options.quantity)))
+        price = tuple(
+            price_lines(recommended_settings(model_file.twin, twin_options.tolerance, twin_options.quantity_name))
+        )
     return ExaminedFile(
         model_file,
         agreements,
@@ -209,7 +214,7 @@ def _examine_file(
         tuple(lost),
         report,
         price,
-        tuple(_constraint_lines(model_file, twin_options.states)),
+        tuple(_constraint_lines(model_file, twin_options.state_count)),
     )
 
 
@@ -264,7 +269,7 @@ def limits_sentence(joint_names: Sequence[str]) -> str:
     return f"limits of {told} are not built; states are drawn inside the ranges of joints"
 
 
-def twin_lines(twin_results: Twins) -> list[str]:
+def twin_lines(twin_results: TwinResults) -> list[str]:
     """Lines for the screen on all examined model files, and on their comparison."""
     rows = list[str]()
     for examined_file in twin_results.examined:

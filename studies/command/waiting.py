@@ -18,9 +18,9 @@ BAR_DELAY, BAR_PERIOD = 1.0, 0.1
 """Time (s) until the bar is shown, and between two updates."""
 SLOW_COMPILATION = 0.4
 """Time (s) of a compilation from which the bar shows it; loading a compiled kernel takes less."""
-LEAST_SHARE = 0.01
+LEAST_SHARE_FOR_ESTIMATE = 0.01
 """Finished share of the work from which the bar shows the remaining time."""
-COMPILE_SECONDS = {
+COMPILE_SECONDS_OF_SYSTEM = {
     "pitch-plane": 5.0,
     "ride": 5.0,
     "wheelset": 15.0,
@@ -80,19 +80,19 @@ class CompilationTimer:
 class ProgressState:
     """State of the progress bar: current task, finished share, the running time integration, and numba's compilations.
 
-    system : of the scene, for the time that its kernels take.
+    system_name : of the scene, for the time that its kernels take.
     """
 
-    text: str
-    system: str = ""
-    share: float = 0.0
+    task_text: str
+    system_name: str = ""
+    finished_share: float = 0.0
     start_time: float = field(default_factory=time.monotonic)
     compilations: CompilationTimer = field(default_factory=CompilationTimer)
     _march: tuple[Any, float] = (None, 0.0)
 
     def tell(self, task_text: str, finished_share: float) -> None:
         """Set the bar's text to the task that begins, and its finished share (0 to 1)."""
-        self.text, self.share = task_text, min(max(finished_share, 0.0), 1.0)
+        self.task_text, self.finished_share = task_text, min(max(finished_share, 0.0), 1.0)
 
     def state(self) -> tuple[str, float | None, str]:
         """Current task, finished share and text of the remaining time for the bar; the share is None if it is
@@ -100,7 +100,7 @@ class ProgressState:
         if self.compilations.is_compiling():
             compilation_seconds, expected_seconds = (
                 self.compilations.compilation_seconds(),
-                COMPILE_SECONDS.get(self.system, 0.0),
+                COMPILE_SECONDS_OF_SYSTEM.get(self.system_name, 0.0),
             )
             share = compilation_seconds / expected_seconds if expected_seconds > compilation_seconds else None
             return (
@@ -111,19 +111,25 @@ class ProgressState:
         worked = time.monotonic() - self.start_time - self.compilations.compilation_seconds()
         march = PROGRESS_FUNCTIONS[-1] if PROGRESS_FUNCTIONS else None
         if march is None:
-            return self.text, self.share or None, _time_left_text(_remaining_seconds(self.share, worked), worked)
+            return (
+                self.task_text,
+                self.finished_share or None,
+                _time_left_text(_remaining_seconds(self.finished_share, worked), worked),
+            )
         if march is not self._march[0]:
             self._march = march, worked
         share, since = 0.0, worked - self._march[1]
         with suppress(Exception):  # an engine that is asked at a bad time
             share = min(max(float(march()), 0.0), 1.0)
-        return self.text, share, _time_left_text(_remaining_seconds(share, since), worked)
+        return self.task_text, share, _time_left_text(_remaining_seconds(share, since), worked)
 
 
 def _remaining_seconds(finished_share: float, elapsed_seconds: float) -> float | None:
     """Remaining time (s) of a task of which ``finished_share`` took ``elapsed_seconds``; None while the share is too
     small."""
-    return elapsed_seconds * (1.0 - finished_share) / finished_share if finished_share > LEAST_SHARE else None
+    return (
+        elapsed_seconds * (1.0 - finished_share) / finished_share if finished_share > LEAST_SHARE_FOR_ESTIMATE else None
+    )
 
 
 def _time_left_text(remaining_seconds: float | None, elapsed_seconds: float) -> str:
@@ -175,7 +181,7 @@ def _draw_bar(progress_state: ProgressState, finished_event: threading.Event) ->
     columns = TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.fields[left]}")
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False) as bar:
-        task = bar.add_task(progress_state.text, total=None, left="")
+        task = bar.add_task(progress_state.task_text, total=None, left="")
         while True:
             progress_state.compilations.attach()
             text, share, left = progress_state.state()

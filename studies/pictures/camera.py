@@ -41,20 +41,22 @@ class Camera:
         right /= np.linalg.norm(right)
         return np.array([right, np.cross(back, right), back])
 
-    def pixels(self, picture_height: int) -> float:
+    def pixels_per_metre(self, picture_height: int) -> float:
         """Pixels per metre at the camera's target, in a picture of a height in pixels."""
         return picture_height / (
             2.0 * np.tan(self.angle_of_view / 2.0) * float(np.linalg.norm(np.subtract(self.eye, self.target)))
         )
 
-    def horizon(self, picture_height: int) -> float:
+    def horizon_row(self, picture_height: int) -> float:
         """Row (pixels from the top) of the horizon in a picture of a height in pixels; negative if it lies above the
         picture."""
         _, upright, back = self.axes
         level = float(np.dot(back, self.up) / np.dot(upright, self.up))
         return picture_height / 2.0 * (1.0 - level / np.tan(self.angle_of_view / 2.0))
 
-    def projected(self, points: np.ndarray, picture_width: int, picture_height: int) -> tuple[np.ndarray, np.ndarray]:
+    def projected_points(
+        self, points: np.ndarray, picture_width: int, picture_height: int
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Pixels (..., 2) of points (..., 3) in m, and inverse distances (...) in 1/m along the camera's axis; these
         are negative for points behind the camera."""
         in_camera_axes = (points - self.eye) @ self.axes.T
@@ -81,21 +83,23 @@ def painted_picture(
 
     A later layer lies over all earlier ones, as arrows over bodies do.
     """
-    height_share = np.clip(np.arange(2 * picture_height) / max(1.0, 2.0 * camera.horizon(picture_height)), 0.0, 1.0)[
-        :, None
-    ]
+    height_share = np.clip(
+        np.arange(2 * picture_height) / max(1.0, 2.0 * camera.horizon_row(picture_height)), 0.0, 1.0
+    )[:, None]
     shade = (sky_colours[0] + height_share * (sky_colours[1] - sky_colours[0])).astype(np.float32)
     image = np.broadcast_to(shade[:, None], (2 * picture_height, 2 * picture_width, 3)).copy()
     for layer in surface_layers:
         inverse_depths = np.zeros(image.shape[:2], np.float32)
         solid = [surface for surface in layer if surface.alpha == 1.0]
         if solid:
-            paint(
+            paint_triangles(
                 *_shaded_triangles(camera, solid, picture_width, picture_height, sky_colours[1]), image, inverse_depths
             )
         for surface in (surface for surface in layer if surface.alpha < 1.0):
             veil, front = image.copy(), inverse_depths.copy()
-            paint(*_shaded_triangles(camera, [surface], picture_width, picture_height, sky_colours[1]), veil, front)
+            paint_triangles(
+                *_shaded_triangles(camera, [surface], picture_width, picture_height, sky_colours[1]), veil, front
+            )
             image += np.float32(surface.alpha) * (veil - image)
     return (image[::2, ::2] + image[1::2, ::2] + image[::2, 1::2] + image[1::2, 1::2]) / 4.0  # smooth edges
 
@@ -103,8 +107,9 @@ def painted_picture(
 def _shaded_triangles(
     camera: Camera, surfaces: list[PaintedSurface], picture_width: int, picture_height: int, haze_colour: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners, inverse distances and colours, as ``paint`` takes them, of the triangles in front of the camera."""
-    corners, near = camera.projected(
+    """Corners, inverse distances and colours, as ``paint_triangles`` takes them, of the triangles in front of the
+    camera."""
+    corners, near = camera.projected_points(
         np.concatenate([surface.corners for surface in surfaces]), 2 * picture_width, 2 * picture_height
     )
     normals = np.concatenate([surface.normals for surface in surfaces])
@@ -122,7 +127,7 @@ def _shaded_triangles(
 
 
 @njit(cache=True, error_model="numpy")
-def columns_within(start_value, growth_per_column, left_column, right_column):
+def columns_with_positive_value(start_value, growth_per_column, left_column, right_column):
     """First and last column between ``left_column`` and ``right_column`` for which start_value + column * growth is not
     negative; the first is greater than the last if there is no such column.
     """
@@ -134,7 +139,7 @@ def columns_within(start_value, growth_per_column, left_column, right_column):
 
 
 @njit(cache=True, error_model="numpy")
-def paint(corners, inverse_distances, colours, image, inverse_depths):
+def paint_triangles(corners, inverse_distances, colours, image, inverse_depths):
     """Paint triangles into ``image`` (h, w, 3), at pixels where the triangle is nearer to the camera than the surface
     recorded in ``inverse_depths`` (h, w), in 1/m.
 
@@ -154,9 +159,11 @@ def paint(corners, inverse_distances, colours, image, inverse_depths):
             # Shares of corners 1 and 2 at column 0, and their growth from column to column.
             first, one_on = (-x0 * (y2 - y0) - (x2 - x0) * (row - y0)) / area, (y2 - y0) / area
             weight_of_second, two_on = ((x1 - x0) * (row - y0) + x0 * (y1 - y0)) / area, -(y1 - y0) / area
-            left, right = columns_within(first, one_on, max(0.0, min(x0, x1, x2)), min(width - 1.0, max(x0, x1, x2)))
-            left, right = columns_within(weight_of_second, two_on, left, right)
-            left, right = columns_within(1.0 - first - weight_of_second, -one_on - two_on, left, right)
+            left, right = columns_with_positive_value(
+                first, one_on, max(0.0, min(x0, x1, x2)), min(width - 1.0, max(x0, x1, x2))
+            )
+            left, right = columns_with_positive_value(weight_of_second, two_on, left, right)
+            left, right = columns_with_positive_value(1.0 - first - weight_of_second, -one_on - two_on, left, right)
             for column in range(math.ceil(left), math.floor(right) + 1):
                 b, c = first + column * one_on, weight_of_second + column * two_on
                 a = 1.0 - b - c

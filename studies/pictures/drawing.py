@@ -19,7 +19,9 @@ def draw_frame(
 ) -> np.ndarray:
     """Image (height, width, 3), with colours from 0 to 1, of frame number ``frame_number`` of a motion."""
     poses = {name: drawn_pose(filmed_motion, film_stage, name, frame_number) for name in film_stage.shapes}
-    bodies = [surface.moved(*poses[name]) for name, shapes in film_stage.shapes.items() for surface in shapes]
+    bodies = [
+        surface.rotated_and_shifted(*poses[name]) for name, shapes in film_stage.shapes.items() for surface in shapes
+    ]
     around = film_stage.scenery(float(filmed_motion.times[frame_number]))
 
     def end(body_name: str, body_point: tuple[float, float, float]) -> np.ndarray:
@@ -28,9 +30,9 @@ def draw_frame(
 
     struts = [
         rod(end(s.first_body, s.first_point), end(s.second_body, s.second_point), 0.025, GREY_COLOUR)
-        for s in film_stage.struts
+        for s in film_stage.drawn_rods
     ]
-    thick = ARROW_HALF_WIDTH * picture_height / film_stage.camera.pixels(picture_height)
+    thick = ARROW_HALF_WIDTH * picture_height / film_stage.camera.pixels_per_metre(picture_height)
     arrows = [
         arrow(*line, thick, film_stage.arrow_styles[force.kind].colour)
         for force, line in zip(filmed_motion.arrows, arrow_lines(filmed_motion, film_stage, frame_number), strict=True)
@@ -67,15 +69,15 @@ def drawn_pose(
         rest_position + film_stage.magnification * (filmed_motion.positions[body_name][frame_number] - rest_position),
         filmed_motion.rotations[body_name][frame_number],
     )
-    if body_name in film_stage.wheels:
+    if body_name in film_stage.wheel_bodies:
         # the smallest rotation that takes the y axis to the axle
         axis = np.cross([0.0, 1.0, 0.0], turn[:, 1])
         sine = float(np.linalg.norm(axis))
         angle = np.arctan2(sine, turn[1, 1])
         lean = Rotation.from_rotvec(axis * (angle / sine if sine > 0 else 0.0))
-        return position, _magnified_turn(lean, film_stage.magnification) @ lean.as_matrix().T @ turn
-    return position, _magnified_turn(Rotation.from_matrix(turn), film_stage.magnification)
+        return position, _magnified_rotation(lean, film_stage.magnification) @ lean.as_matrix().T @ turn
+    return position, _magnified_rotation(Rotation.from_matrix(turn), film_stage.magnification)
 
 
-def _magnified_turn(rotation: Rotation, magnification: float) -> np.ndarray:
+def _magnified_rotation(rotation: Rotation, magnification: float) -> np.ndarray:
     return Rotation.from_rotvec(magnification * rotation.as_rotvec()).as_matrix()

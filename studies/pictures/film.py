@@ -59,7 +59,7 @@ class ForceCurve:
 
     kind: str
     direction: tuple[float, float, float]
-    meaning: str
+    direction_text: str
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,8 @@ class FilmStage:
     """Shapes of the bodies and of their surroundings, with the camera and the settings of the picture.
 
     shapes : surfaces of each body in its axes; rest_positions : position (m) of each body at rest; magnification :
-    factor on displacements and rotations from rest (except for the spin of ``wheels`` about y); arrow_styles : by the
-    kind of force; curve : plotted below; scenery : surfaces of the surroundings at a time (s), in space.
+    factor on displacements and rotations from rest (except for the spin of ``wheel_bodies`` about y); arrow_styles : by
+    the kind of force; force_curve : plotted below; scenery : surfaces of the surroundings at a time (s), in space.
     """
 
     title: str
@@ -87,14 +87,14 @@ class FilmStage:
     rest_positions: Mapping[str, ArrayLike]
     camera: Camera
     arrow_styles: dict[str, ArrowStyle]
-    curve: ForceCurve
+    force_curve: ForceCurve
     scenery: Callable[[float], list[PaintedSurface]] = lambda time: []
     magnification: float = 1.0
-    wheels: tuple[str, ...] = ()
-    struts: tuple[DrawnRod, ...] = ()
+    wheel_bodies: tuple[str, ...] = ()
+    drawn_rods: tuple[DrawnRod, ...] = ()
 
 
-def largest_differences(first_motion: FilmedMotion, second_motion: FilmedMotion) -> tuple[float, float, float]:
+def largest_motion_differences(first_motion: FilmedMotion, second_motion: FilmedMotion) -> tuple[float, float, float]:
     """Largest differences between two filmed motions: of positions (m), of elements of rotation matrices, and of forces
     (N)."""
     position_pairs = [(position, second_motion.positions[name]) for name, position in first_motion.positions.items()]

@@ -48,21 +48,21 @@ CURVE_STYLES = {"reference": ("-", 3.2), "exudyn": ("-", 1.5), "mujoco": (":", 1
 """Line style and width of each engine's curve, by which coinciding curves are seen."""
 
 
-def draw(picture_path: Path) -> Path:
+def draw_overview_picture(picture_path: Path) -> Path:
     """Run the scene in all implementations and save the overview picture; returns its path."""
-    runs = {engine: _run(engine, method, 1e-3) for engine, method in RUNGE_KUTTA.items()}
+    runs = {engine: _run_of_engine(engine, method, 1e-3) for engine, method in RUNGE_KUTTA.items()}
     figure, axes = subplot_mosaic(
         [["idea", "idea", "idea"], ["force", "gap", "price"]], figsize=(COLUMN_WIDTH, 4.5), height_ratios=(1, 1.5)
     )
     _draw_overview(axes["idea"])
     _plot_forces(axes["force"], runs)
     _plot_differences(axes["gap"], runs)
-    _plot_prices(axes["price"])
+    _plot_errors_over_calls(axes["price"])
     add_heading(figure, "twinrig: one vehicle in two engines and by hand, each result with its error and its price")
     return save(figure, picture_path)
 
 
-def _run(engine: str, integrator: str, time_step: float) -> Result:
+def _run_of_engine(engine: str, integrator: str, time_step: float) -> Result:
     """Result of the scene in an engine by a method with a step (s)."""
     scene = build(SCENE | {"engines": {engine: {"integrator": integrator, "step": time_step}}})
     return run(scene, engine)
@@ -100,19 +100,19 @@ def _plot_differences(axis: Any, runs_by_engine: dict[str, Result]) -> None:
     )
 
 
-def _plot_prices(axis: Any) -> None:
+def _plot_errors_over_calls(axis: Any) -> None:
     """Plot the relative error of the force over the number of force calls: of the classical Runge-Kutta method, and of
     each engine's default solver."""
-    truth = _run("reference", "RK4", REFERENCE_STEP)
+    truth = _run_of_engine("reference", "RK4", REFERENCE_STEP)
     curves = {engine: (method, f"{LABELS[engine]}, {name}") for engine, (method, name, _) in ENGINE_DEFAULTS.items()}
     curves |= {"reference": ("RK4", "Runge-Kutta, all three")}
     for engine, (method, name) in curves.items():
-        points = [_calls_and_error(_run(engine, method, step), truth, step) for step in STABLE_STEPS[engine]]
+        points = [_calls_and_error(_run_of_engine(engine, method, step), truth, step) for step in STABLE_STEPS[engine]]
         calls, errors = zip(*points, strict=True)
         axis.loglog(calls, errors, "o-", color=COLOURS[engine], markersize=3.5)
         axis.text(1.4 * calls[-1], errors[-1], name, color=COLOURS[engine], va="center", fontsize=SMALL_TEXT)
     for engine, (method, _, step) in ENGINE_DEFAULTS.items():
-        calls_and_error = _calls_and_error(_run(engine, method, step), truth, step)
+        calls_and_error = _calls_and_error(_run_of_engine(engine, method, step), truth, step)
         axis.plot(*calls_and_error, "o", markersize=10, markerfacecolor="none", color=COLOURS[engine])
     axis.set(xlabel="work: force calls [-] (ring: usual step)", xlim=(4e2, 4e6), title="What accuracy costs: error [-]")
 
@@ -168,4 +168,4 @@ def _draw_box(
 
 
 if __name__ == "__main__":
-    draw(Path(sys.argv[1]))
+    draw_overview_picture(Path(sys.argv[1]))

@@ -23,7 +23,7 @@ from studies.pictures.film import (
     exudyn_poses,
     mujoco_poses,
 )
-from studies.pictures.road import DRAWN_ROAD, PassingRoad
+from studies.pictures.road import DRAWN_ROAD_LENGTH, PassingRoad
 from studies.pictures.shapes import PAINT_COLOUR, PaintedSurface, box, tyred_wheel
 
 SPEED, SEED = 15.0, 1
@@ -43,7 +43,7 @@ def stage_and_motions(
     duration: float, frame_times: np.ndarray, engines: tuple[str, ...]
 ) -> tuple[FilmStage, list[FilmedMotion]]:
     """Stage of the film, and the motion by each engine, with frames at the steps nearest to ``frame_times`` (s)."""
-    run = {"duration": float(np.ceil(duration + DRAWN_ROAD / SPEED)), "step": 1e-3}
+    run = {"duration": float(np.ceil(duration + DRAWN_ROAD_LENGTH / SPEED)), "step": 1e-3}
     scene = scene_of(
         {
             "title": "pitch plane",
@@ -63,7 +63,7 @@ def _motion_of_engine(engine: str, assembly: Assembly, frame_times: np.ndarray) 
     rows = np.rint(frame_times / (run.times[1] - run.times[0])).astype(int)
     positions, turns = (_exudyn_poses if engine == "exudyn" else _mujoco_poses)(model, run.states[rows, :4])
     poses = {name: position + _body_offset(assembly, name) for name, position in positions.items()}, turns
-    return FilmedMotion(engine, run.times[rows], *poses, arrows(assembly, channels, rows, poses)), channels
+    return FilmedMotion(engine, run.times[rows], *poses, force_arrows(assembly, channels, rows, poses)), channels
 
 
 def _mujoco_poses(engine_model: Any, states: np.ndarray) -> Poses:
@@ -102,7 +102,7 @@ def _body_offset(assembly: Assembly, body_name: str) -> np.ndarray:
     return np.array([0.0, 0.0, -CHASSIS_HEIGHT]) if x is None else np.array([x, 0.0, -WHEEL_RADIUS])
 
 
-def arrows(
+def force_arrows(
     assembly: Assembly, run_channels: Channels, frame_rows: np.ndarray, body_poses: Poses
 ) -> tuple[ForceArrow, ...]:
     """Force arrows of the road on the wheels and of the suspension on the chassis, in the frames ``frame_rows`` of a
@@ -141,18 +141,18 @@ def stage(assembly: Assembly, run_channels: Channels) -> FilmStage:
     return FilmStage(
         f"Pitch-plane vehicle at {SPEED:g} m/s on a road of class D",
         caption,
-        shapes(assembly),
+        body_shapes(assembly),
         rest_positions,
         camera,
         ARROW_STYLES,
         FORCE_CURVE,
-        road.at,
+        road.surfaces_at,
         MOTION_MAGNIFICATION,
-        struts=struts,
+        drawn_rods=struts,
     )
 
 
-def shapes(assembly: Assembly) -> dict[str, list[PaintedSurface]]:
+def body_shapes(assembly: Assembly) -> dict[str, list[PaintedSurface]]:
     """Drawn shapes by body: a beam for the chassis, and two wheels."""
     p = assembly.parameters
     beam = box(p.a + p.b + 0.5, 0.5, 0.14, PAINT_COLOUR).at((p.b - p.a) / 2.0, 0.0, -0.07)

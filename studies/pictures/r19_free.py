@@ -25,7 +25,7 @@ from studies.pictures.film import (
     exudyn_poses,
     mujoco_poses,
 )
-from studies.pictures.road import DRAWN_ROAD, PassingRoad
+from studies.pictures.road import DRAWN_ROAD_LENGTH, PassingRoad
 from studies.pictures.shapes import PAINT_COLOUR, Colour, PaintedSurface, ball, box, extruded_outline, tyred_wheel
 
 SPEED, STEP, SEED, LATERAL_START_SPEED = 20.0, 1e-3, 3, 0.5
@@ -55,7 +55,7 @@ def stage_and_motions(
     vehicle = vehicle_with_road_forces(vehicle_of(scene))
     road = road_path(excitation_of(scene, wheels(vehicle)), SPEED, STEP)
     steps = int(np.ceil(duration / road.step))
-    table = road.wheel_heights_and_rates(steps + int(DRAWN_ROAD / SPEED / road.step), SEED)
+    table = road.wheel_heights_and_rates(steps + int(DRAWN_ROAD_LENGTH / SPEED / road.step), SEED)
     rows = np.rint(frame_times / road.step).astype(int)
     motions = [_motion_of_engine(engine, vehicle, road, table[: 2 * steps + 1], rows) for engine in engines]
     return stage(vehicle, road, table), motions
@@ -83,7 +83,9 @@ def _motion_of_engine(
         joints = np.empty_like(kept_run.positions)
         joints[:, model.numbers.columns] = kept_run.positions
         poses = mujoco_poses(model.model, model.numbers.bodies, joints)
-    return FilmedMotion(engine, kept_run.times, *poses, arrows(vehicle, kept_run, road_table[2 * frame_rows], poses))
+    return FilmedMotion(
+        engine, kept_run.times, *poses, force_arrows(vehicle, kept_run, road_table[2 * frame_rows], poses)
+    )
 
 
 def _exudyn_poses(engine_model: Any, positions: np.ndarray) -> Poses:
@@ -101,7 +103,7 @@ def _exudyn_poses(engine_model: Any, positions: np.ndarray) -> Poses:
     }  # a mass that slides has other axes
 
 
-def arrows(
+def force_arrows(
     vehicle: SpatialVehicle, vehicle_run: Trajectory, road_heights: np.ndarray, body_poses: Poses
 ) -> tuple[ForceArrow, ...]:
     """Force arrows of the wheel loads, with their static part, and of the side forces, both at the road, from a run's
@@ -155,17 +157,17 @@ def stage(vehicle: SpatialVehicle, road: RoadPath, road_table: np.ndarray) -> Fi
     return FilmStage(
         title,
         caption,
-        shapes(vehicle),
+        body_shapes(vehicle),
         rest_positions,
         camera,
         ARROW_STYLES,
         FORCE_CURVE,
-        passing.at,
+        passing.surfaces_at,
         MOTION_MAGNIFICATION,
     )
 
 
-def shapes(vehicle: SpatialVehicle) -> dict[str, list[PaintedSurface]]:
+def body_shapes(vehicle: SpatialVehicle) -> dict[str, list[PaintedSurface]]:
     """Drawn shapes by body: wheels, a car around the chassis, engine and occupants."""
     person = [ball(0.13, PERSON_COLOUR).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON_COLOUR).at(0.0, 0.0, 0.02)]
     return {

@@ -25,12 +25,12 @@ class FilmTable(Strict):
     frames_per_second: int = Field(default=25, ge=1, le=60, description="of the film")
     format: Literal["mp4", "gif", "png"] = Field(default="mp4", description="png: stills only")
 
-    def times(self) -> np.ndarray:
+    def frame_times(self) -> np.ndarray:
         """Times (s) of the frames within the run, the first one at 0."""
-        return np.arange(self.frames) / (self.slow_motion * self.frames_per_second)
+        return np.arange(self.frame_count) / (self.slow_motion * self.frames_per_second)
 
     @property
-    def frames(self) -> int:
+    def frame_count(self) -> int:
         """Number of frames of the film."""
         return max(1, round(self.duration * self.slow_motion * self.frames_per_second))
 
@@ -47,9 +47,9 @@ class PictureScene(SceneFile):
 def build(scene_table: Mapping[str, Any], scene_file: str = "", scene_folder: Path = Path()) -> PictureScene:
     """Checked scene of pictures from nested tables; raises InputError for anything that is not understood."""
     scene = checked(PictureScene, scene_table, scene_file, scene_folder)
-    if scene.film.frames > FRAME_LIMIT:
+    if scene.film.frame_count > FRAME_LIMIT:
         allowed = (
-            f"makes {scene.film.frames} frames (duration x slow motion x frames per second) where at most "
+            f"makes {scene.film.frame_count} frames (duration x slow motion x frames per second) where at most "
             f"{FRAME_LIMIT} are drawn: show less of the run"
         )
         raise InputError(scene_file, "film.duration", scene.film.duration, allowed)

@@ -26,7 +26,7 @@ class PaintedSurface:
     colour: Colour
     alpha: float = 1.0
 
-    def moved(self, displacement: np.ndarray, rotation: np.ndarray) -> "PaintedSurface":
+    def rotated_and_shifted(self, displacement: np.ndarray, rotation: np.ndarray) -> "PaintedSurface":
         """The surface rotated by ``rotation`` (3, 3) and then shifted by ``displacement`` (3,) in m."""
         return replace(self, corners=self.corners @ rotation.T + displacement, normals=self.normals @ rotation.T)
 
@@ -132,7 +132,7 @@ def line_solid(
     perpendicular = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
     perpendicular /= np.linalg.norm(perpendicular)
     turn = np.column_stack([perpendicular, direction, np.cross(perpendicular, direction)])
-    return surface_of_revolution(axial_positions, radii, colour, 16).moved(tail_point, turn)
+    return surface_of_revolution(axial_positions, radii, colour, 16).rotated_and_shifted(tail_point, turn)
 
 
 def rod(tail_point: np.ndarray, head_point: np.ndarray, radius: float, colour: Colour) -> PaintedSurface:

@@ -80,10 +80,10 @@ def _motion_of_engine(engine: str, duration: float, frame_times: np.ndarray) -> 
         middle = mbs.AddMarker(link)
         mbs.Assemble()
         poses = exudyn_poses(mbs, {"wheelset": partial(mbs.GetMarkerOutput, middle)}, joints)
-    return FilmedMotion(engine, path_of_frames.times, *poses, arrows(CHOSEN_WHEELSET, path_of_frames), run)
+    return FilmedMotion(engine, path_of_frames.times, *poses, force_arrows(CHOSEN_WHEELSET, path_of_frames), run)
 
 
-def arrows(wheelset: Wheelset, wheelset_run: WheelsetPath) -> tuple[ForceArrow, ...]:
+def force_arrows(wheelset: Wheelset, wheelset_run: WheelsetPath) -> tuple[ForceArrow, ...]:
     """Force arrows of the normal force and the creep force on both wheels, at the contact points along a run."""
     drawn_arrows = []
     for k, (name, side) in enumerate(SIDE_SIGNS.items()):
@@ -107,18 +107,18 @@ def stage(wheelset: Wheelset) -> FilmStage:
     return FilmStage(
         f"Wheelset that hunts at {SPEED:g} m/s, creep forces by FASTSIM",
         f"displacements drawn {MOTION_MAGNIFICATION:g} times as large; forces on the wheels",
-        {"wheelset": shapes(wheelset)},
+        {"wheelset": wheelset_shapes(wheelset)},
         {"wheelset": (0.0, 0.0, 0.0)},
         camera,
         ARROW_STYLES,
         FORCE_CURVE,
-        lambda time: track(wheelset, SPEED * time),
+        lambda time: track_surfaces(wheelset, SPEED * time),
         MOTION_MAGNIFICATION,
         ("wheelset",),
     )
 
 
-def shapes(wheelset: Wheelset) -> list[PaintedSurface]:
+def wheelset_shapes(wheelset: Wheelset) -> list[PaintedSurface]:
     """Surfaces of an axle and two wheels with the model's conical treads; the flange clearance is drawn magnified."""
     end = wheelset.half_spacing + 0.12
     surfaces = [surface_of_revolution([-end, -end, end, end], [0.0, 0.085, 0.085, 0.0], DARK_COLOUR)]
@@ -142,13 +142,13 @@ def shapes(wheelset: Wheelset) -> list[PaintedSurface]:
     return surfaces
 
 
-def track(wheelset: Wheelset, travelled_distance: float) -> list[PaintedSurface]:
+def track_surfaces(wheelset: Wheelset, travelled_distance: float) -> list[PaintedSurface]:
     """Surfaces of rails, sleepers and ballast after the wheelset has travelled a distance (m)."""
     first, rail_end, top = -24.0, 2.4, wheelset.radius
     head = np.array([[-0.036, 0.012], [-0.02, 0.0], [0.02, 0.0], [0.036, 0.012], [0.036, 0.05], [-0.036, 0.05]])
     rotation = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # the outline lies in y and z
     rail = [
-        extruded_outline(head, rail_end - first, STEEL_COLOUR).moved(np.zeros(3), rotation),
+        extruded_outline(head, rail_end - first, STEEL_COLOUR).rotated_and_shifted(np.zeros(3), rotation),
         box(rail_end - first, 0.02, 0.1, RAIL_COLOUR).at(0.0, 0.0, 0.1),
         box(rail_end - first, 0.14, 0.02, RAIL_COLOUR).at(0.0, 0.0, 0.16),
     ]

@@ -250,7 +250,7 @@ def _input_rows(engine: str) -> list[Row]:
 def _explicit_solver_row(engine: str) -> Row:
     """Row: error of the enforced moment by an explicit solver in the hand-written reference and in MuJoCo, where the
     pitch is an input and no constraint."""
-    error = prescribed_pitch.explicit_error(engine, Path())
+    error = prescribed_pitch.explicit_solver_error(engine, Path())
     return Observed(
         f"guards.constraint.{engine}",
         SYSTEM,

@@ -25,7 +25,7 @@ from validation.hard_cases.setups import (
     driven_by_forces,
     largest_magnitude,
     root_mean_square,
-    settings,
+    run_settings,
     vehicle,
 )
 
@@ -65,7 +65,7 @@ def _readings_of_run(
     assembly = (
         base if start_state is None else driven_by_forces(base, Sampled(np.zeros((400, 2)), SAMPLE_PERIOD, held=True))
     )
-    engine_settings = settings(engine_name, SAMPLE_PERIOD, 0.3)
+    engine_settings = run_settings(engine_name, SAMPLE_PERIOD, 0.3)
     model = build(engine_name, assembly, engine_settings)
     run = simulate(assembly.scene, engine_name, engine_settings, assembly)
     felt = readings_of(run, assembly.scene.effects["accelerometers"])
@@ -160,7 +160,9 @@ def missing_reading_naive_result(work_folder: Path) -> str:
     return f"a sum over one missing reading is lost for {100 * lost:.0f} % of the record"
 
 
-def _free_fall(engine_name: str, pitch: float, pitch_rate: float) -> tuple[np.ndarray, np.ndarray, StartState]:
+def _readings_in_free_fall(
+    engine_name: str, pitch: float, pitch_rate: float
+) -> tuple[np.ndarray, np.ndarray, StartState]:
     """Accelerometer readings, states and initial state of a rotating vehicle in free fall with unstressed struts."""
     p, sine, speed = vehicle().parameters, np.sin(pitch), np.cos(pitch) * pitch_rate
     start = np.array([-p.b * sine, p.a * sine, 0, pitch, -p.b * speed, p.a * speed, 0, pitch_rate])
@@ -170,7 +172,7 @@ def _free_fall(engine_name: str, pitch: float, pitch_rate: float) -> tuple[np.nd
 
 def vertical_nose_error(engine_name: str, work_folder: Path) -> float:
     """Case: the nose passes through the vertical. Error: largest difference of an entry of the rotation matrix."""
-    felt, states, start = _free_fall(engine_name, 1.4, 3.0)
+    felt, states, start = _readings_in_free_fall(engine_name, 1.4, 3.0)
     orientation = recovered_motion(sensor_array(ROOF_SENSORS), felt, SAMPLE_PERIOD, start).orientation
     no_angles = np.zeros(len(states))
     return largest_magnitude(
@@ -181,7 +183,7 @@ def vertical_nose_error(engine_name: str, work_folder: Path) -> float:
 def gimbal_lock_error(engine_name: str, work_folder: Path) -> float:
     """Case: the nose points straight up, where roll and yaw are not unique; it must be refused. Error: largest roll or
     yaw (rad) that is returned."""
-    felt, _, start = _free_fall(engine_name, np.pi / 2, 0.0)
+    felt, _, start = _readings_in_free_fall(engine_name, np.pi / 2, 0.0)
     return largest_magnitude(
         recovered_motion(sensor_array(ROOF_SENSORS), felt, SAMPLE_PERIOD, start).angles()[:, [0, 2]]
     )

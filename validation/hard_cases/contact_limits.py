@@ -22,7 +22,7 @@ CELL, RADIUS, BALL_LOAD = 1.5e-4, 0.3, 1e4
 """Cell size (m), radius (m) of two balls, load (N) on each."""
 
 
-def _linear_error(cell_count: int, march_name: March) -> float:
+def _linear_theory_error(cell_count: int, march_name: March) -> float:
     answer = fastsim(
         RollingEllipse(A, B, LOAD, MU, SMALL_CREEPAGE, 0.0, 0.0), MATERIAL_PAIR, cells=cell_count, march=march_name
     )
@@ -32,13 +32,13 @@ def _linear_error(cell_count: int, march_name: March) -> float:
 def few_cells_error(engine_name: str, work_folder: Path) -> float:
     """Case: small creepage on 8, 16 and 32 cells. Error: largest relative error of the force divided by the bound 1.7
     (8 / cells)^1.9 per cent."""
-    return max(_linear_error(n, "second-order") / (0.017 * (8.0 / n) ** 1.9) for n in (8, 16, 32))
+    return max(_linear_theory_error(n, "second-order") / (0.017 * (8.0 / n) ** 1.9) for n in (8, 16, 32))
 
 
 def few_cells_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: error on few cells if the first step at the leading edge is a complete
     one."""
-    return f"a whole first step makes the force {100 * _linear_error(8, 'plain'):.1f} % too large by 8 cells"
+    return f"a whole first step makes the force {100 * _linear_theory_error(8, 'plain'):.1f} % too large by 8 cells"
 
 
 def _draw_creepages(draw_count: int = 400) -> np.ndarray:

@@ -17,7 +17,7 @@ SAMPLE_PERIOD, SAMPLES, STEP = 0.05, 10, 1e-3
 """Period (s) of the held force samples, 35 times the decay time of the fastest pole; number of samples; step (s)."""
 
 
-def _base_assembly(added_forces: np.ndarray) -> Assembly:
+def vehicle_with_added_forces(added_forces: np.ndarray) -> Assembly:
     """The linearised vehicle under its weight, with ``added_forces`` (n, 2) in N added to its wheel force samples."""
     base = setups.vehicle(geometry="linear")
     forces = setups.static_forces(base, SAMPLES, SAMPLE_PERIOD)
@@ -27,21 +27,24 @@ def _base_assembly(added_forces: np.ndarray) -> Assembly:
 def covariance_error(engine_name: str, work_folder: Path) -> float:
     """Case: a force error of 1 N in each single sample is simulated. Error: relative difference between the sum of
     squared responses and the covariance recursion."""
-    quiet = setups.run(engine_name, _base_assembly(np.zeros((SAMPLES, 2))), STEP, SAMPLE_PERIOD * SAMPLES).states[-1]
+    quiet = setups.run(
+        engine_name, vehicle_with_added_forces(np.zeros((SAMPLES, 2))), STEP, SAMPLE_PERIOD * SAMPLES
+    ).states[-1]
     responses = []
     for sample in range(SAMPLES):
         for wheel in range(2):
             values = np.zeros((SAMPLES, 2))
             values[sample, wheel] = 1.0
             responses.append(
-                setups.run(engine_name, _base_assembly(values), STEP, SAMPLE_PERIOD * SAMPLES).states[-1] - quiet
+                setups.run(engine_name, vehicle_with_added_forces(values), STEP, SAMPLE_PERIOD * SAMPLES).states[-1]
+                - quiet
             )
     covariance, expected = np.array(responses).T @ np.array(responses), _covariance_recursion()
     return setups.largest_magnitude(covariance - expected) / setups.largest_magnitude(expected)
 
 
 def _covariance_recursion() -> np.ndarray:
-    assembly = _base_assembly(np.zeros((SAMPLES, 2)))
+    assembly = vehicle_with_added_forces(np.zeros((SAMPLES, 2)))
     assert isinstance(assembly.input, Sampled)
     return noise_covariances(ErrorPath(assembly, assembly.input, round(SAMPLE_PERIOD / STEP), SAMPLES), 1.0)[-1]
 
@@ -53,7 +56,7 @@ def van_loan_naive_result(work_folder: Path) -> str:
 
     from models.engines.stability import first_order, linearised
 
-    base = _base_assembly(np.zeros((SAMPLES, 2)))
+    base = vehicle_with_added_forces(np.zeros((SAMPLES, 2)))
     p, linear = base.parameters, linearised(base.vehicle)
     pushes = np.zeros((8, 2))
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2

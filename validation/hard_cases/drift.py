@@ -33,7 +33,7 @@ SOFT_STIFFNESS = 50.0
 """Stiffness (N m/rad) of a pitch spring that is too soft; 82 are needed on this road."""
 DRIFTED_PITCH = 0.05
 """Pitch error (rad) beyond which runs are not compared."""
-HEAVY_NOISE = 300.0
+HEAVY_FORCE_NOISE = 300.0
 """Standard deviation (N) of force noise with which a run drifts off after some seconds."""
 
 
@@ -191,7 +191,7 @@ def two_points_naive_result(work_folder: Path) -> str:
 def difference_before_drift(engine_name: str, work_folder: Path) -> float:
     """Case: a noisy run compared with another implementation until drift-off. Error: largest difference of the states
     divided by the largest state."""
-    scene = scene_on_true_forces(work_folder, true_run(), {"force_noise": {"deviation": HEAVY_NOISE}})
+    scene = scene_on_true_forces(work_folder, true_run(), {"force_noise": {"deviation": HEAVY_FORCE_NOISE}})
     other_engine = "mujoco" if engine_name == "reference" else "reference"
     first, second_run = (simulate(scene, name) for name in (engine_name, other_engine))
     rows_before = slice(None, _first_row_off(first, true_run()))
@@ -211,7 +211,7 @@ def before_drift_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: two step sizes of the reference compared over 30 s, beyond drift-off."""
     truth = simulate(road_scene(duration=30.0), "reference")
     write_measurement(truth, work_folder, 1e-3)
-    scene = force_scene(work_folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY_NOISE}})
+    scene = force_scene(work_folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY_FORCE_NOISE}})
     coarse, fine = (simulate(scene, "reference", Settings("RK4", step, 30.0)) for step in (1e-3, 5e-4))
     gap = np.abs(coarse["pitch"] - fine["pitch"][::2])
     gap_before = gap[: _first_row_off(coarse, truth)].max()

@@ -86,7 +86,7 @@ def _unqueried_vehicle(parameter_changes: dict[str, float], _: str, work_folder:
     return float(not plausible_plane(TWIN.model_copy(update=parameter_changes)))
 
 
-def _case(
+def _refusal_case(
     case_name: str, error_function: Callable[[str, Path], float], expected_ending: OutcomeWord, message: str
 ) -> HardCase:
     expected: dict[str, OutcomeWord] = (
@@ -107,11 +107,13 @@ def _case(
 
 CASES = (
     *(
-        _case(name, partial(_missed_doubts, change, True), "refused", "refused before the run, with what is wrong")
+        _refusal_case(
+            name, partial(_missed_doubts, change, True), "refused", "refused before the run, with what is wrong"
+        )
         for name, change in REFUSED.items()
     ),
     *(
-        _case(
+        _refusal_case(
             name,
             partial(_missed_doubts, change, True),
             "right",
@@ -119,9 +121,9 @@ CASES = (
         )
         for name, change in DOUBTED.items()
     ),
-    _case("true wheel forces", partial(_missed_doubts, lambda f: f, False), "right", "nothing is said"),
+    _refusal_case("true wheel forces", partial(_missed_doubts, lambda f: f, False), "right", "nothing is said"),
     *(
-        _case(name, partial(_unqueried_vehicle, change), "right", "queried, with the value and what is usual")
+        _refusal_case(name, partial(_unqueried_vehicle, change), "right", "queried, with the value and what is usual")
         for name, change in QUERIED.items()
     ),
 )

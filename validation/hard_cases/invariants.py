@@ -17,7 +17,7 @@ from validation.hard_cases.setups import (
     driven_by_forces,
     largest_magnitude,
     run,
-    settings,
+    run_settings,
     static_forces,
     tight_solution,
     vehicle,
@@ -51,7 +51,7 @@ def loads_at_rest(engine_name: str, work_folder: Path) -> float:
     for parameters in VEHICLES:
         base = vehicle(parameters)
         p = base.parameters
-        path = simulate(base.scene, engine_name, settings(engine_name, 1e-3, 0.1), base)
+        path = simulate(base.scene, engine_name, run_settings(engine_name, 1e-3, 0.1), base)
         front = (p.m3 * p.a / (p.a + p.b) + p.m1) * GRAVITY
         rear = (p.m3 * p.b / (p.a + p.b) + p.m2) * GRAVITY
         for name, load in (("f1", front), ("f2", rear)):
@@ -59,13 +59,13 @@ def loads_at_rest(engine_name: str, work_folder: Path) -> float:
     return worst
 
 
-def nose_up_error(engine_name: str, work_folder: Path) -> float:
+def raised_nose_error(engine_name: str, work_folder: Path) -> float:
     """Case: the nose is raised by 0.01 rad. Error: relative difference of the accelerations from values written by hand
     for the linear geometry."""
     base, tilt = vehicle("asymmetric_twin", "linear"), 0.01
     p, state = base.parameters, base.initial.copy()
     state[3] += tilt
-    acceleration = build(engine_name, base, settings(engine_name, 1e-3, 0.1)).acceleration(0.0, *np.split(state, 2))
+    acceleration = build(engine_name, base, run_settings(engine_name, 1e-3, 0.1)).acceleration(0.0, *np.split(state, 2))
     front, rear = -p.k3 * p.b * tilt, p.k4 * p.a * tilt  # the front strut is pulled, the rear one pressed
     hand = np.array([front / p.m1, rear / p.m2, -(front + rear) / p.m3, (p.b * front - p.a * rear) / p.I])
     if not (acceleration[0] < 0 < acceleration[1] and acceleration[3] < 0):
@@ -73,7 +73,7 @@ def nose_up_error(engine_name: str, work_folder: Path) -> float:
     return largest_magnitude(acceleration - hand) / largest_magnitude(hand)
 
 
-def push_error(engine_name: str, work_folder: Path) -> float:
+def pushed_wheels_error(engine_name: str, work_folder: Path) -> float:
     """Case: each wheel is pushed up by 100 N in addition to its static load. Error: relative difference of the
     accelerations from 100 N / mass."""
     base = vehicle("asymmetric_twin")
@@ -81,7 +81,7 @@ def push_error(engine_name: str, work_folder: Path) -> float:
     for wheel, mass in enumerate((p.m1, p.m2)):
         forces = static_forces(base, 3, 1e-3)
         forces.values[:, wheel] += 100.0
-        model = build(engine_name, driven_by_forces(base, forces), settings(engine_name, 1e-3, 2e-3))
+        model = build(engine_name, driven_by_forces(base, forces), run_settings(engine_name, 1e-3, 2e-3))
         wanted = np.zeros(4)
         wanted[wheel] = -100.0 / mass
         worst = max(
@@ -128,7 +128,7 @@ def free_heave_error(engine_name: str, work_folder: Path) -> float:
     base = vehicle("asymmetric_twin")
     p = base.parameters
     forces = static_forces(base, 100, 1e-3, noise_deviation=2000.0)
-    model = build(engine_name, driven_by_forces(base, forces), settings(engine_name, 1e-3, 0.1))
+    model = build(engine_name, driven_by_forces(base, forces), run_settings(engine_name, 1e-3, 0.1))
     masses, worst, size = np.array([p.m1, p.m2, p.m3]), 0.0, 0.0
     for i, state in enumerate(np.random.default_rng(6).uniform(-1, 1, (50, 8)) * [0.5, 0.5, 0.5, 3, 3, 3, 3, 3]):
         acceleration = model.acceleration(2 * i * 1e-3, *np.split(state, 2))[:3]
@@ -239,7 +239,7 @@ CASES = (
         "of the largest",
         1e-11,
         "a preload of 4 kN cancels to 10 N",
-        nose_up_error,
+        raised_nose_error,
     ),
     HardCase(
         "nothing but what is described",
@@ -248,7 +248,7 @@ CASES = (
         "of the acceleration",
         1e-11,
         "a preload of 4 kN cancels to nothing",
-        push_error,
+        pushed_wheels_error,
     ),
     HardCase(
         "more force in front",

@@ -24,7 +24,7 @@ from validation.hard_cases.setups import REFUSED, driven_by_forces, largest_magn
 SAMPLE_PERIOD, DURATION = 5e-3, 6.0
 FORCE, ANGLE, START_TURN = 16.0, 8e-4, 0.2
 """Standard deviations of each force sample (N), of each measured angle (rad) and of the unknown initial pitch (rad)."""
-SLOW_PERIOD = 0.1
+SLOW_SAMPLE_PERIOD = 0.1
 """Period (s) of force samples that is 70 time constants of the wheels."""
 
 
@@ -70,7 +70,7 @@ def _largest_pitch_error(
     return largest_magnitude(((run["pitch"] - base.initial[3]) / run["pitch_deviation"])[late & (run.times > 0.1)])
 
 
-def outage_error(engine_name: str, work_folder: Path) -> float:
+def pitch_outage_error(engine_name: str, work_folder: Path) -> float:
     """Case: no pitch measurement for 3.5 s. Error: largest pitch error divided by its stated deviation."""
     return _largest_pitch_error(engine_name, work_folder, slice(200, 900))
 
@@ -127,15 +127,15 @@ def _exact_response() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     a, b = relative_state_matrices(vehicle(geometry="linear").without_tyres())
     block = np.zeros((8, 8))
     block[:6, :6], block[:6, 6:] = a, b
-    return a, b, expm(block * SLOW_PERIOD)[:6, 6:]
+    return a, b, expm(block * SLOW_SAMPLE_PERIOD)[:6, 6:]
 
 
 def stiff_process_noise_error(engine_name: str, work_folder: Path) -> float:
     """Case: process noise of a filter with forces at 10 Hz, for a vehicle with a pole at -697 1/s. Error: relative
     difference from the exact covariance."""
     base = vehicle(geometry="linear")
-    forces = Sampled(static_forces(base, 2, SLOW_PERIOD).values, SLOW_PERIOD, held=True)
-    step = PitchStep(driven_by_forces(base, forces), SLOW_PERIOD, 1)
+    forces = Sampled(static_forces(base, 2, SLOW_SAMPLE_PERIOD).values, SLOW_SAMPLE_PERIOD, held=True)
+    step = PitchStep(driven_by_forces(base, forces), SLOW_SAMPLE_PERIOD, 1)
     early = step.advance(np.append(RELATIVE_STATES @ base.initial, 0.0), 0)[2][:6]
     wanted = _exact_response()[2]
     return float(np.linalg.norm(early @ early.T - wanted @ wanted.T) / np.linalg.norm(wanted @ wanted.T))
@@ -144,7 +144,7 @@ def stiff_process_noise_error(engine_name: str, work_folder: Path) -> float:
 def stiff_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: process noise of the stiff vehicle by filterpy's discretisation."""
     a, b, wanted = _exact_response()
-    noise = van_loan_discretization(a, b * np.sqrt(SLOW_PERIOD), SLOW_PERIOD)[1]
+    noise = van_loan_discretization(a, b * np.sqrt(SLOW_SAMPLE_PERIOD), SLOW_SAMPLE_PERIOD)[1]
     variance_ratio, least_eigenvalue = (
         noise[2, 2] / (wanted @ wanted.T)[2, 2],
         np.linalg.eigvalsh((noise + noise.T) / 2).min(),
@@ -163,7 +163,7 @@ CASES = (
         "deviations",
         5.0,
         "Gaussian: 5 deviations are left once in 1.7 million",
-        outage_error,
+        pitch_outage_error,
         {},
         outage_naive_result,
     ),

@@ -193,14 +193,14 @@ THROWN_REASON = "a corner of the force within a step costs its square"
 RAISED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "raised")
 PATH, STATES = "exact path, piece by piece", "m, rad, m/s, rad/s"
 UNDAMPED_PARAMETERS = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
-HIGH_START = np.array([-5.0, -5.0, -5.0, 0.0, 12.0, 12.0, 12.0, 0.0])
+HIGH_START_STATE = np.array([-5.0, -5.0, -5.0, 0.0, 12.0, 12.0, 12.0, 0.0])
 EXACT: tuple[tuple[str, str, float, ErrorFunction], ...] = (
     ("both wheels in the air", "no tyre holds anything", 1e-4, exact_path_case()),
     (
         "fall from five metres",
         "lands at 15 m/s, many times the tyres' depth at rest",
         1e-3,
-        exact_path_case(start_state=HIGH_START),
+        exact_path_case(start_state=HIGH_START_STATE),
     ),
     ("tyres without damping", "every landing is thrown back", 1e-4, exact_path_case(d1=0.0, d2=0.0)),
     (

@@ -11,7 +11,7 @@ from validation.hard_cases.case import IMPLEMENTATIONS, HardCase
 from validation.measured.measured_files import csv, csv_forms, kinds, mdf4, rpc3, tdms
 from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, CutSweep, OddFile, file_of_bytes
 
-CHECKS = {
+CHECK_OF_OUTCOME = {
     "right": "times, values and names as they were written",
     "named": "times, values and names as far as they go, and the doubt is named",
     "refused": "refused with file and place; nothing is written",
@@ -52,7 +52,7 @@ def case_of_file(odd_file: OddFile) -> HardCase:
     return HardCase(
         name=odd_file.name,
         difficulty=odd_file.difficulty,
-        exact_answer=CHECKS[odd_file.expected_outcome],
+        exact_answer=CHECK_OF_OUTCOME[odd_file.expected_outcome],
         unit="s or N",
         tolerance=TOLERANCE,
         tolerance_reason="values have bits that every format keeps; CSV writes times with 15 digits",

@@ -20,7 +20,7 @@ from validation.hard_cases.setups import (
     largest_magnitude,
     root_mean_square,
     run,
-    settings,
+    run_settings,
     smooth_pitch,
     static_forces,
     tight_solution,
@@ -105,7 +105,7 @@ def soft_constraint_naive_result(work_folder: Path) -> str:
 def _soft_constraint_error(time_step: float) -> float:
     """Rms error (N m) of the moment by MuJoCo's soft equality constraint on the pitch joint."""
     assembly, count = guided_assembly(), round(DURATION / time_step)
-    spec = specification(assembly.vehicle, settings("mujoco", time_step, DURATION, "Euler"))
+    spec = specification(assembly.vehicle, run_settings("mujoco", time_step, DURATION, "Euler"))
     spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1="chassis pitch", name2="", data=[0.0] * 12)
     model = spec.compile()
@@ -155,14 +155,14 @@ class InconsistentStart(UncheckedExudyn):
 
 def unchecked_exudyn_run(assembly: Assembly, time_step: float, integrator: str = "GeneralizedAlpha") -> Trajectory:
     """A run in Exudyn without checks, with its default spectral radius."""
-    return UncheckedExudyn(assembly, settings("exudyn", time_step, DURATION, integrator, spectral_radius=0.9)).run()
+    return UncheckedExudyn(assembly, run_settings("exudyn", time_step, DURATION, integrator, spectral_radius=0.9)).run()
 
 
 def undamped_multiplier_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: Exudyn without checks and with its inconsistent start, late in the run."""
     parts = []
     for name, radius in (("GeneralizedAlpha", 1.0), ("TrapezoidalIndex2", 0.6)):
-        engine_settings = settings("exudyn", 1e-3, DURATION, name, spectral_radius=radius)
+        engine_settings = run_settings("exudyn", 1e-3, DURATION, name, spectral_radius=radius)
         path = InconsistentStart(guided_assembly(), engine_settings).run()
         assert path.moment is not None
         late = (path.moment - exact_enforced_moment())[-100:]
@@ -235,7 +235,7 @@ class StraightLinePitch:
         return self.period * np.arange(1, round(duration / self.period))
 
 
-def halving_ratio(engine_name: str, work_folder: Path) -> float:
+def step_halving_ratio(engine_name: str, work_folder: Path) -> float:
     """Case: pitch data sampled every 1 ms. Error: error of the moment at steps of 0.5 ms divided by that at 1 ms."""
     integrator = CONSTRAINED_INTEGRATORS[engine_name]
     paths = [run(engine_name, guided_assembly(), h, DURATION, integrator) for h in (1e-3, 5e-4)]
@@ -253,7 +253,7 @@ def halving_naive_result(work_folder: Path) -> str:
     return f"Exudyn on straight lines between clean samples: {errors[0]:.1f} N m at 1 ms, {errors[1]:.2g} at 0.5 ms"
 
 
-def explicit_error(engine_name: str, work_folder: Path) -> float:
+def explicit_solver_error(engine_name: str, work_folder: Path) -> float:
     """Case: the explicit fourth-order solver of each engine with a prescribed pitch. Error: relative rms difference of
     the enforced moment."""
     path = run(engine_name, guided_assembly(), 1e-3, DURATION)
@@ -284,7 +284,7 @@ def fed_back_moment_error(engine_name: str, work_folder: Path) -> float:
     return root_mean_square(path.moment[40:]) / root_mean_square(inertia)
 
 
-def pitch_gap(engine_name: str, work_folder: Path) -> float:
+def pitch_difference(engine_name: str, work_folder: Path) -> float:
     """Case: prescribed pitch at 1 ms. Error: largest difference (rad) of the pitch from the prescribed one."""
     assembly = guided_assembly()
     path = run(engine_name, assembly, 1e-3, DURATION, CONSTRAINED_INTEGRATORS[engine_name])
@@ -357,7 +357,7 @@ CASES = (
         "ratio",
         0.5,
         "order 2 gives 1/4, order 4 gives 1/16; the moment follows a C4 spline",
-        halving_ratio,
+        step_halving_ratio,
         {},
         halving_naive_result,
         answer_independence="native",
@@ -370,7 +370,7 @@ CASES = (
         "of its rms",
         1e-4,
         "the project's bound at 1 ms",
-        explicit_error,
+        explicit_solver_error,
         {"exudyn": "refused"},
         explicit_naive_result,
         answer_independence="native",
@@ -392,7 +392,7 @@ CASES = (
         "rad",
         1e-10,
         "the paper's own demand on the guided pitch",
-        pitch_gap,
+        pitch_difference,
         {},
         pitch_rate_gap_result,
     ),

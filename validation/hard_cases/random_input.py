@@ -31,7 +31,7 @@ from models.systems.ride.of_scene import linear_vehicle
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases import setups
 from validation.hard_cases.case import HardCase
-from validation.hard_cases.setups import driven_by_forces, largest_magnitude, settings, static_forces
+from validation.hard_cases.setups import driven_by_forces, largest_magnitude, run_settings, static_forces
 
 NORMAL_LIMIT = 3.29
 """Number of standard errors that a normal value exceeds once in a thousand."""
@@ -46,7 +46,7 @@ def repeated_call_difference(engine_name: str, work_folder: Path) -> float:
     difference, which must be 0."""
     base = setups.vehicle("asymmetric_twin")
     forces = static_forces(base, 200, 1e-3, noise_deviation=800.0)
-    model = build(engine_name, driven_by_forces(base, forces), settings(engine_name, 1e-3, 0.1))
+    model = build(engine_name, driven_by_forces(base, forces), run_settings(engine_name, 1e-3, 0.1))
     states = base.initial + 1e-3 * np.random.default_rng(3).standard_normal((40, 8))
     arguments_of_calls = [(2e-3 * i, state[:4], state[4:]) for i, state in enumerate(states)]
     once = [model.acceleration(*arguments).copy() for arguments in arguments_of_calls]

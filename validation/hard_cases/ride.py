@@ -83,7 +83,7 @@ def growth_rate_error(engine_name: str, work_folder: Path) -> float:
     return largest_relative_error(grown, covariance.rate)
 
 
-def undamped_case(corner_wavenumber: float) -> Callable[..., float]:
+def undamped_tyre_case(corner_wavenumber: float) -> Callable[..., float]:
     """Case: a body on an undamped tyre. Error: that of the growth rates of its variances, against S(w) / 2 w^2."""
 
     def error(engine_name: str, work_folder: Path) -> float:
@@ -176,7 +176,7 @@ def _deviations_of_ride(vehicle: LinearVehicle, speed: float = SPEED, axle_corre
     ).deviation
 
 
-def mirror_error(engine_name: str, work_folder: Path) -> float:
+def mirrored_springs_error(engine_name: str, work_folder: Path) -> float:
     """Case: the left springs, then the right springs, are twice as stiff. Error: relative difference of the deviations
     of outputs on the centre line."""
     car = load_vehicle("seven_freedoms")
@@ -301,7 +301,7 @@ CASES = (
         "",
         1e-9,
         ROUNDED,
-        undamped_case(0.3),
+        undamped_tyre_case(0.3),
     ),
     HardCase(
         "no damping, road that next to walks",
@@ -310,7 +310,7 @@ CASES = (
         "",
         1e-9,
         ROUNDED,
-        undamped_case(1e-9),
+        undamped_tyre_case(1e-9),
     ),
     HardCase(
         "next to no damping",
@@ -376,7 +376,7 @@ CASES = (
         "",
         1e-10,
         ROUNDED,
-        mirror_error,
+        mirrored_springs_error,
     ),
     HardCase(
         "drive from stop to stop",

@@ -170,7 +170,9 @@ def pure_spin_force_error(engine_name: str, work_folder: Path) -> float:
     return float(max(np.abs(moment / (bound * STEEP_WHEELSET.radius)).max(), abs(contact["fy"].sum()) / bound[0]))
 
 
-def halving_error(engine_name: str, work_folder: Path, wheelset: Wheelset, speed: float, time_step: float) -> float:
+def step_halving_error(
+    engine_name: str, work_folder: Path, wheelset: Wheelset, speed: float, time_step: float
+) -> float:
     """Case: a displaced wheelset at a speed (m/s). Error: largest difference (m, rad) from half the step (s)."""
     equations = built_wheelset(engine_name, wheelset, speed)
     start = equations.displaced_state(1e-3)
@@ -178,7 +180,7 @@ def halving_error(engine_name: str, work_folder: Path, wheelset: Wheelset, speed
     return float(np.abs(ends[1] - ends[0])[: eq.ANGLE].max())
 
 
-def crawling_error(engine_name: str, work_folder: Path) -> float:
+def crawling_speed_error(engine_name: str, work_folder: Path) -> float:
     """Case: a speed of 1e-6 m/s. Error: relative difference of the displacement from a standing wheelset's."""
     rest_state = built_wheelset(engine_name, HEAVY_WHEELSET, 0.0).rest
     runs = (
@@ -350,7 +352,9 @@ CASES = (
         pure_spin_force_error,
     ),
     *(
-        HardCase(name, hard, "half the step", "m", 1e-8, "error of the step", partial(halving_error, wheelset=w, **run))
+        HardCase(
+            name, hard, "half the step", "m", 1e-8, "error of the step", partial(step_halving_error, wheelset=w, **run)
+        )
         for name, hard, w, run in (
             ("wheelset at 200 m/s", "far above its critical speed", CHOSEN_WHEELSET, FAST_RUN),
             ("conicity of 0.5", "geometry far from linear", STEEP_WHEELSET, STEEP_RUN),
@@ -363,7 +367,7 @@ CASES = (
         "",
         1e-4,
         "1e-5 of the mixture",
-        crawling_error,
+        crawling_speed_error,
     ),
     HardCase(
         "wheelset in the middle of the track",

@@ -30,7 +30,7 @@ from validation.hard_cases.setups import (
     exact_states,
     largest_magnitude,
     run,
-    settings,
+    run_settings,
     static_forces,
     vehicle,
 )
@@ -91,7 +91,7 @@ def impulse_naive_result(work_folder: Path) -> str:
     return f"held and linear end {abs(ends[0] - ends[1]) / abs(ends[0]):.1%} apart in pitch: half a sample of shift"
 
 
-def halving_ratio(engine_name: str, work_folder: Path) -> float:
+def step_halving_ratio(engine_name: str, work_folder: Path) -> float:
     """Case: held noise sampled every 2 ms, in steps of 1 and 0.5 ms. Error: error of the finer steps, against the
     matrix exponential, divided by that of the coarser."""
     base = vehicle(geometry="linear")
@@ -235,7 +235,7 @@ def bump_error(engine_name: str, work_folder: Path) -> float:
 def bump_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: the bump by scipy's LSODA with default settings."""
     assembly = vehicle().with_input("road", _road_with_bump())
-    model = build("reference", assembly, settings("reference", 5e-4, 10.5))
+    model = build("reference", assembly, run_settings("reference", 5e-4, 10.5))
     solution = solve_ivp(
         lambda t, y: np.concatenate((y[4:], model.acceleration(t, y[:4], y[4:]))),
         (0.0, 10.5),
@@ -315,7 +315,7 @@ CASES = (
         "of the error at the double step",
         0.1,
         "order 4 gives 1/16; a force that is looked up per stage gives 1/2",
-        halving_ratio,
+        step_halving_ratio,
         {},
         halving_naive_result,
     ),

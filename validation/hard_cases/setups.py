@@ -82,7 +82,7 @@ def static_forces(
     )
 
 
-def settings(
+def run_settings(
     engine_name: str, time_step: float, duration: float, integrator: str = "", **solver_options: float
 ) -> Settings:
     """Settings of a run in an engine; the recommended integrator is the default; step and duration in s."""
@@ -98,7 +98,9 @@ def run(
     **solver_options: float,
 ) -> Trajectory:
     """Trajectory of a run with all checks that a user's run has, so that it may be refused."""
-    return build(engine_name, assembly, settings(engine_name, time_step, duration, integrator, **solver_options)).run()
+    return build(
+        engine_name, assembly, run_settings(engine_name, time_step, duration, integrator, **solver_options)
+    ).run()
 
 
 def unchecked_run(
@@ -110,7 +112,7 @@ def unchecked_run(
     **solver_options: float,
 ) -> Trajectory:
     """Trajectory of a run without the checks before it; only the guard after the run is active."""
-    engine_settings = settings(engine_name, time_step, duration, integrator, **solver_options)
+    engine_settings = run_settings(engine_name, time_step, duration, integrator, **solver_options)
     return build_unchecked(engine_name, assembly, engine_settings).run()
 
 

@@ -63,12 +63,12 @@ def _exact_motion_with_kinks() -> Trajectory:
 
 def kink_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: error of Exudyn's limit stops in place of the force law."""
-    with mock.patch.object(exudyn_engine, "_add_pitch_spring", _limit_stop):
+    with mock.patch.object(exudyn_engine, "_add_pitch_spring", _add_limit_stop):
         pitch_error = dead_band_edge_error("exudyn", work_folder)
     return f"Exudyn's limit stops, asked once per step: pitch off by {pitch_error:.1e} rad"
 
 
-def _limit_stop(exudyn_build: exudyn_engine.PitchPlaneBuild, pitch_spring: PitchSpring) -> None:
+def _add_limit_stop(exudyn_build: exudyn_engine.PitchPlaneBuild, pitch_spring: PitchSpring) -> None:
     state = exudyn_build.mbs.AddNode(items.NodeGenericData(initialCoordinates=[0, 0, 0], numberOfDataCoordinates=3))
     exudyn_build.mbs.AddObject(
         items.CoordinateSpringDamperExt(
@@ -227,7 +227,7 @@ def bandwidth_beyond_nyquist(engine_name: str, work_folder: Path) -> float:
     return 0.0
 
 
-def _refused_scene(scene_effects: dict[str, Any]) -> Callable[[str, Path], float]:
+def refused_scene_case(scene_effects: dict[str, Any]) -> Callable[[str, Path], float]:
     """Case: a scene under wheel forces with the effects must be refused."""
 
     def error(engine_name: str, work_folder: Path) -> float:
@@ -337,7 +337,7 @@ CASES = (
         "",
         0.0,
         "an error would grow",
-        _refused_scene({"high_pass": {"cut_off": 1000.0}}),
+        refused_scene_case({"high_pass": {"cut_off": 1000.0}}),
         REFUSED,
         answer_independence="none",
     ),
@@ -348,7 +348,7 @@ CASES = (
         "",
         0.0,
         "a scene that says two things",
-        _refused_scene({"pitch_spring": {"stiffness": 1e3}, "prescribed_pitch": {"file": "pitch.csv"}}),
+        refused_scene_case({"pitch_spring": {"stiffness": 1e3}, "prescribed_pitch": {"file": "pitch.csv"}}),
         REFUSED,
         answer_independence="none",
     ),
