@@ -43,24 +43,26 @@ class BicycleObservations:
 
 
 def observed_and_predicted(
-    folder: str | Path,
-    choose: Sequence[float] = (),
+    data_folder: str | Path,
+    chosen_speeds: Sequence[float] = (),
     bicycle: Whipple | None = None,
     base_control: Control = EXPERIMENT_FEEDBACK,
 ) -> BicycleObservations:
-    """Choose suspected parameters from the measurements at the speeds ``choose`` (m/s, all by default), and predict
-    weave at the other speeds; raises InputError."""
-    all_observations, bicycle = observations(folder), bicycle or load_bicycle("steer_by_wire")
+    """Choose suspected parameters from the measurements at the speeds ``chosen_speeds`` (m/s, all by default), and
+    predict weave at the other speeds; raises InputError."""
+    all_observations, bicycle = observations(data_folder), bicycle or load_bicycle("steer_by_wire")
     speeds = [observation.speed for observation in all_observations]
-    for speed in choose:
+    for speed in chosen_speeds:
         if speed not in speeds:
-            raise InputError(folder, "speeds", speed, f"no windows at this speed; there are {speeds} m/s")
-    choice = ranked_suspects(bicycle, base_control, [o for o in all_observations if not choose or o.speed in choose])
+            raise InputError(data_folder, "speeds", speed, f"no windows at this speed; there are {speeds} m/s")
+    choice = ranked_suspects(
+        bicycle, base_control, [o for o in all_observations if not chosen_speeds or o.speed in chosen_speeds]
+    )
     predictions = {}
     for observation in all_observations:
-        if choose and observation.speed not in choose:
+        if chosen_speeds and observation.speed not in chosen_speeds:
             choice_without_it = choice
-        elif choose or len(all_observations) < 4:
+        elif chosen_speeds or len(all_observations) < 4:
             continue
         else:
             choice_without_it = ranked_suspects(

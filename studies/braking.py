@@ -20,7 +20,7 @@ from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import StopHistory, wheel_names
 
 SYSTEM = "braking"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 class Options(Strict):
@@ -29,7 +29,9 @@ class Options(Strict):
     adhesion: bool = Field(True, description="measure adhesion utilisation too, by many short runs")
 
 
-def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: BrakingScene, engines: tuple[str, ...], output_folder: File, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Run every procedure in each engine; saves NAME.nc, NAME.png and NAME_pressures.csv of each procedure, also of a
     failed run up to its failure, and returns the summary."""
     from studies.braking_figures import stop_figure
@@ -41,14 +43,14 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
     for i, name in enumerate(scene.procedures):
         results = dict[str, Result]()
         for j, engine in enumerate(engines):
-            progress(f"{name}, {engine}", (i * len(engines) + j) / (len(scene.procedures) * len(engines)))
+            report_progress(f"{name}, {engine}", (i * len(engines) + j) / (len(scene.procedures) * len(engines)))
             try:
                 result: Result | None = drive(scene, engine, procedure=name, error=scene.error)
             except RunFailed as error:
                 failed[f"{name}, {engine}"], result = str(error), error.partial
             if result is not None and len(result.times) > 2:
                 results[engine] = result
-                result.save(folder / (f"{name}.nc" if len(engines) == 1 else f"{name}_{engine}.nc"))
+                result.save(output_folder / (f"{name}.nc" if len(engines) == 1 else f"{name}_{engine}.nc"))
         if not results:
             if not any(run_name.startswith(f"{name}, ") for run_name in failed):
                 table.append(f"  {name}: stands within two samples of {scene.run.sample:g} s: it has no figures")
@@ -57,8 +59,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
         stop = StopHistory(next(iter(results.values())).detail)
         radius = plane_of(scene).radius
         measured, rims = measured_pressures_of(scene, name, radius.size), stop.path.turning * radius
-        write_pressures(folder / f"{name}_pressures.csv", stop.times, stop.path.pressures, rims)
-        stop_figure(scene, name, results, folder / f"{name}.png", measured)
+        write_pressures(output_folder / f"{name}_pressures.csv", stop.times, stop.path.pressures, rims)
+        stop_figure(scene, name, results, output_folder / f"{name}.png", measured)
         figures, remarks = dict[str, float](), list[str]()
         try:
             figures = figures_of_merit(scene, name, stop) if options.adhesion else {}
@@ -76,23 +78,23 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
             **train,
         }
         table += (
-            figures_lines(name, stop, figures, wheels)
+            figures_of_merit_lines(name, stop, figures, wheels)
             + remarks
             + measurement_end_line(measured, stop)
             + comparison_lines(results)
         )
     summary = {"failed": failed, "results": all_stops, "answer": answer, "table": table}
-    return {"scene": scene.title, "folder": str(folder), **summary}
+    return {"scene": scene.title, "folder": str(output_folder), **summary}
 
 
 def rim_speed_differences(
-    measured_pressures: MeasuredPressures | None, stop: StopHistory, rim_speeds: np.ndarray
+    measured_pressures: MeasuredPressures | None, stop: StopHistory, computed_rim_speeds: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Rms differences (m/s) between the computed and the measured rim speed of each wheel; empty if none were measured.
-    rim_speeds (n, W) : computed, in m/s, of the W wheels."""
+    computed_rim_speeds (n, W) : computed, in m/s, of the W wheels."""
     if measured_pressures is None or measured_pressures.speeds is None:
         return {}
-    return {"rim less measured, rms [m/s]": measured_pressures.wheel_speed_error(stop.times, rim_speeds)}
+    return {"rim less measured, rms [m/s]": measured_pressures.wheel_speed_error(stop.times, computed_rim_speeds)}
 
 
 def measurement_end_line(measured_pressures: MeasuredPressures | None, stop: StopHistory) -> list[str]:
@@ -103,11 +105,11 @@ def measurement_end_line(measured_pressures: MeasuredPressures | None, stop: Sto
     return [f"    measured pressures end at {measured_pressures.times[-1]:.3f} s: from then on the last ones stay"]
 
 
-def comparison_lines(results: dict[str, Result]) -> list[str]:
+def comparison_lines(results_by_engine: dict[str, Result]) -> list[str]:
     """Lines for the screen, one per engine: position and yaw at which the vehicle stopped, stopping time, and computing
     time."""
     rows = []
-    for engine, result in results.items():
+    for engine, result in results_by_engine.items():
         path = result.detail
         x, y, yaw = path.states[-1, 0, :3]
         clock = f"; {path.clock}" if path.clock else ""
@@ -118,22 +120,29 @@ def comparison_lines(results: dict[str, Result]) -> list[str]:
     return rows
 
 
-def figures_lines(name: str, stop: StopHistory, figures: dict[str, float], wheels: dict[str, np.ndarray]) -> list[str]:
+def figures_of_merit_lines(
+    procedure_name: str, stop: StopHistory, vehicle_figures: dict[str, float], wheel_figures: dict[str, np.ndarray]
+) -> list[str]:
     """Lines for the screen on one procedure: a table of figures for the vehicle, and a table with a column per
     wheel."""
     remaining_text = f"still {stop.speed[-1]:.2f} m/s; all figures are those until then"
     unfinished = "" if stop.path.ended_at_rest else f": not stopped by {stop.times[-1]:g} s, {remaining_text}"
-    rows = [f"  {name.replace('_', ' ')}{unfinished}"]
+    rows = [f"  {procedure_name.replace('_', ' ')}{unfinished}"]
     rows += [f"    {stop.path.clock}"] if stop.path.clock else []
     rows += [f"    {key:<40}{value:>10.2f}" for key, value in stop.vehicle_results().items()]
     rows += [
-        f"    {key:<40}{f'{value:.3f}' if np.isfinite(value) else 'not steady':>10}" for key, value in figures.items()
+        f"    {key:<40}{f'{value:.3f}' if np.isfinite(value) else 'not steady':>10}"
+        for key, value in vehicle_figures.items()
     ]
-    rows += [f"    ({NOT_CHECKED_REMARK})"] if figures else []
-    rows += ["    (without steering correction, and of the vehicle without trailer)"] if "z_MALS" in figures else []
+    rows += [f"    ({NOT_CHECKED_REMARK})"] if vehicle_figures else []
+    rows += (
+        ["    (without steering correction, and of the vehicle without trailer)"] if "z_MALS" in vehicle_figures else []
+    )
     names = wheel_names(stop.path.turning.shape[1])
     rows += ["    " + f"{'wheel':<40}" + "".join(f"{wheel.replace('trailer ', 'tr. '):>17}" for wheel in names)]
-    return rows + [f"    {key:<40}" + "".join(f"{value:>17.2f}" for value in values) for key, values in wheels.items()]
+    return rows + [
+        f"    {key:<40}" + "".join(f"{value:>17.2f}" for value in values) for key, values in wheel_figures.items()
+    ]
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stops import SampleScatter, StopEnsemble, scatter_of, statistical_errors
 
 SYSTEM = "braking"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 PAPER_VALUES = {
     "deceleration": ("mean deceleration v0/T [m/s^2]", "1.36 +- 0.02", "1.37 +- 0.4", "fitted"),
     "aside": ("y-displacement [m]", "7.5 +- 0.7", "7.2 +- 0.3", "fitted"),
@@ -69,7 +69,9 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
         )
 
 
-def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: BrakingScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Fit friction and steer angle, and repeat the stops with them; saves the fit as ``rounds.nc`` and
     ``calibration.csv``, a fitted stop as ``calibration.nc`` and ``calibration.png``, and returns the summary."""
     from studies.braking_figures import stop_figure
@@ -79,16 +81,16 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     steer = scene.procedures[options.procedure].steer
     assert steer is not None
     scale, steps = scene.tyres.scale.get(options.surface, 1.0), []
-    progress("loading", 0.0)
+    report_progress("loading", 0.0)
     drive(scene, procedure=options.procedure)  # compiles what is not compiled yet, once and not in every worker
     with Crew.of(scene).at_work(options.runs, *folders_for_workers(scene)) as pool:
         for i in range(options.rounds):
-            progress(f"fit, round {i + 1}", i / (options.rounds + 2))
+            report_progress(f"fit, round {i + 1}", i / (options.rounds + 2))
             means = _means_of_stops(fitted_scene(scene, options, scale, steer), options, options.runs, pool)
             steps.append((scale, steer, means["deceleration"].mean, means["aside"].mean))
             scale *= FITTED_FIGURES["deceleration"] / means["deceleration"].mean
             steer *= FITTED_FIGURES["aside"] / means["aside"].mean
-        progress("as fitted", options.rounds / (options.rounds + 2))
+        report_progress("as fitted", options.rounds / (options.rounds + 2))
         fitted = fitted_scene(scene, options, scale, steer)
         scatters = _means_of_stops(fitted, options, options.last, pool, options.seed + 1)
     columns = zip(QUANTITIES_OF_ROUND.items(), np.array(steps).T, strict=True)
@@ -96,59 +98,66 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     by_rounds = with_sampling_error(
         result(scene, rounds, {}, engine="reference"), statistical_errors(means), options.runs
     )
-    by_rounds.save(folder / "rounds.nc")
+    by_rounds.save(output_folder / "rounds.nc")
     heads = (f"{name} [{unit}]" if unit else name for name, unit in QUANTITIES_OF_ROUND.items())
     rows = [",".join(heads), *(",".join(f"{value:.9g}" for value in step) for step in steps)]
-    write_whole(folder / "calibration.csv", "\n".join(rows) + "\n")
+    write_whole(output_folder / "calibration.csv", "\n".join(rows) + "\n")
     stop = drive(fitted, procedure=options.procedure, error=scene.error)
-    stop.save(folder / "calibration.nc")
-    stop_figure(fitted, options.procedure, {"as fitted": stop}, folder / "calibration.png")
+    stop.save(output_folder / "calibration.nc")
+    stop_figure(fitted, options.procedure, {"as fitted": stop}, output_folder / "calibration.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "results": {"rounds": by_rounds, "as fitted": stop},
-        "table": table(options, scale, steer, scatters),
+        "table": calibration_lines(options, scale, steer, scatters),
         "answer": {"scale": scale, "steer": steer, **{key: figure.mean for key, figure in scatters.items()}},
     }
 
 
-def fitted_scene(scene: BrakingScene, options: Options, friction_scale: float, steer: float) -> BrakingScene:
+def fitted_scene(
+    scene: BrakingScene, study_options: Options, friction_scale: float, steer_angle: float
+) -> BrakingScene:
     """The scene with a friction factor of the surface and a steer angle (rad); raises RunFailed if the fit left their
     possible range."""
-    if not (0.05 < friction_scale < 2.0 and steer < 1.0):
+    if not (0.05 < friction_scale < 2.0 and steer_angle < 1.0):
         raise RunFailed(
-            "calibration", f"the fit diverges: friction times {friction_scale:.3g}, steer angle {steer:.3g} rad"
+            "calibration", f"the fit diverges: friction times {friction_scale:.3g}, steer angle {steer_angle:.3g} rad"
         )
-    procedure = scene.procedures[options.procedure].model_copy(update={"steer": steer})
-    tyres = scene.tyres.model_copy(update={"scale": {**scene.tyres.scale, options.surface: friction_scale}})
-    return scene.model_copy(update={"tyres": tyres, "procedures": {**scene.procedures, options.procedure: procedure}})
+    procedure = scene.procedures[study_options.procedure].model_copy(update={"steer": steer_angle})
+    tyres = scene.tyres.model_copy(update={"scale": {**scene.tyres.scale, study_options.surface: friction_scale}})
+    return scene.model_copy(
+        update={"tyres": tyres, "procedures": {**scene.procedures, study_options.procedure: procedure}}
+    )
 
 
 def _means_of_stops(
-    scene: BrakingScene, options: Options, runs: int, pool: Any, seed: int | None = None
+    scene: BrakingScene, study_options: Options, run_count: int, worker_pool: Any, seed: int | None = None
 ) -> dict[str, SampleScatter]:
     job = StopEnsemble(
         scene.table(),
         scene.file,
         scene.folder,
-        options.procedure,
-        options.speed_spread,
-        options.seed if seed is None else seed,
+        study_options.procedure,
+        study_options.speed_spread,
+        study_options.seed if seed is None else seed,
     )
-    stops = run_paths(job, runs, executor=pool, path_blocks=PathBlocks(STOPS_PER_BLOCK))
+    stops = run_paths(job, run_count, executor=worker_pool, path_blocks=PathBlocks(STOPS_PER_BLOCK))
     return {key: scatter_of(stops[key]) for key in PAPER_VALUES}
 
 
-def table(options: Options, friction_scale: float, steer: float, scatters: dict[str, SampleScatter]) -> list[str]:
+def calibration_lines(
+    study_options: Options, friction_scale: float, steer_angle: float, scatter_by_figure: dict[str, SampleScatter]
+) -> list[str]:
     """Lines for the screen: the fitted parameters, and each figure beside the paper's values."""
     lines = [
-        f"  calibration: friction of {options.surface} times {friction_scale:.4f}, steer angle {steer:.5f} rad",
-        f"  means of {options.last} stops, +- the scatter of one",
+        f"  calibration: friction of {study_options.surface} times {friction_scale:.4f}, "
+        f"steer angle {steer_angle:.5f} rad",
+        f"  means of {study_options.last} stops, +- the scatter of one",
         f"    {'':<34}{'here':>18}   {'paper, simulated':<36}{'paper, measured':<18}",
     ]
     for key, (label, simulated, measured, kind_of_value) in PAPER_VALUES.items():
-        simulated_here = f"{scatters[key].mean:.3f} +- {scatters[key].deviation:.3f}"
+        simulated_here = f"{scatter_by_figure[key].mean:.3f} +- {scatter_by_figure[key].deviation:.3f}"
         lines.append(f"    {label:<34}{simulated_here:>18}   {simulated:<36}{measured:<18}{kind_of_value}")
     return lines
 

@@ -31,19 +31,23 @@ from models.systems.braking.stop_report import SLOWEST_SLIP_SPEED, StopHistory, 
 
 WHEEL_COLOURS = (BLUE, SKY, VERMILION, ORANGE, GREEN, "#66c2a5", PINK, "#e7b5d1")
 GROUND_COLOURS = {"dry": "#9a9a9a", "wet": "#7f9bb3", "snow": "#eceff1", "ice": "#cfe8f3"}
-OTHER_SURFACE = "#e8dcc8"
+OTHER_SURFACE_COLOUR = "#e8dcc8"
 """Colour of a road surface that the user defined."""
 OUTLINE_OVERHANG, HALF_WIDTH = 1.2, 1.1
 """Length (m) of a vehicle's drawn outline beyond its axles, which is chosen, and half of its width (m)."""
 
 
 def stop_figure(
-    scene: BrakingScene, name: str, results: Results, file: File, measured_pressures: MeasuredPressures | None = None
+    scene: BrakingScene,
+    procedure_name: str,
+    results_by_engine: Results,
+    figure_path: File,
+    measured_pressures: MeasuredPressures | None = None,
 ) -> File:
     """Save a figure of the first engine's stop: speeds, slips, pressures and torques over time, and the path from
     above. Lateral motion is added if there is any; body roll and pitch and wheel loads if the vehicle has a
     suspension."""
-    procedure, stop = scene.procedures[name], StopHistory(next(iter(results.values())).detail)
+    procedure, stop = scene.procedures[procedure_name], StopHistory(next(iter(results_by_engine.values())).detail)
     leaves_straight, lean = _moves_laterally(stop), stop.lean
     rows: list[Any] = [["speeds", "slips"], ["pressures", "torques"]]
     rows += ([["angles", "across"]] if leaves_straight else []) + ([["lean", "loads"]] if lean is not None else [])
@@ -58,11 +62,11 @@ def stop_figure(
         axes["across"].plot(stop.times[1:], stop.lateral_acceleration, color=DARK, lw=0.8)
         axes["across"].set(xlabel="time [s]", ylabel="acceleration [m/s²]", title="Lateral acceleration")
     if lean is not None:
-        _plot_lean(axes["lean"], stop.times, lean)
+        _plot_roll_and_pitch(axes["lean"], stop.times, lean)
         _plot_wheel_curves(
             axes["loads"], stop.times[1:], stop.path.reports.load / 1e3, "Load of each wheel", "load [kN]"
         )
-    draw_path_from_above(axes["road"], scene, name, stop)
+    draw_path_from_above(axes["road"], scene, procedure_name, stop)
     handles, labels = axes["speeds"].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
     distance, time = stop.vehicle_results()["stopping distance [m]"], stop.times[-1]
@@ -70,13 +74,14 @@ def stop_figure(
     ended = (
         f"stands after {distance_text} and {time_text}" if stop.path.ended_at_rest else f"still moves at {time_text}"
     )
+    controller = controller_text(scene).replace("{procedure}", procedure_name)
     add_heading(
         figure,
-        f"{scene.title}: {plain_name(name)} from {procedure.speed:g} m/s, "
-        f"{READER_SPELLINGS.get(spelling := controller_text(scene).replace('{procedure}', name), spelling)}; {ended}",
-        results,
+        f"{scene.title}: {readable_name(procedure_name)} from {procedure.speed:g} m/s, "
+        f"{READER_SPELLINGS.get(controller, controller)}; {ended}",
+        results_by_engine,
     )
-    return save(figure, file)
+    return save(figure, figure_path)
 
 
 READER_SPELLINGS = {
@@ -88,12 +93,12 @@ READER_SPELLINGS = {
 """Spellings of procedures and controllers for readers."""
 
 
-def plain_name(name: str) -> str:
+def readable_name(raw_name: str) -> str:
     """Name of a procedure or controller for titles and labels, in its usual spelling or with spaces."""
-    return READER_SPELLINGS.get(name, name.replace("_", " "))
+    return READER_SPELLINGS.get(raw_name, raw_name.replace("_", " "))
 
 
-STRAIGHT_LIMIT = 0.05
+LATERAL_MOTION_LIMIT = 0.05
 """Angle (degrees) and lateral acceleration (m/s^2) up to which a stop is straight and lateral motion is not drawn."""
 
 
@@ -101,7 +106,7 @@ def _moves_laterally(stop: StopHistory) -> bool:
     """Whether yaw, side slip or lateral acceleration during the stop is large enough to be drawn."""
     moving = stop.speed > SLOWEST_SLIP_SPEED
     sideways = np.degrees(stop.path.states[:, 0, 2]), np.degrees(stop.side_slip[moving]), stop.lateral_acceleration
-    return any(np.abs(values).max(initial=0.0) > STRAIGHT_LIMIT for values in sideways)
+    return any(np.abs(values).max(initial=0.0) > LATERAL_MOTION_LIMIT for values in sideways)
 
 
 def _plot_speeds(
@@ -123,16 +128,18 @@ def _plot_speeds(
     axis.set(xlabel="time [s]", ylabel="speed [m/s]", title="Speed of the vehicle and of each rim")
 
 
-def _plot_wheel_curves(axis: Axes, times: np.ndarray, values: np.ndarray, title: str, label: str) -> None:
-    for i, (name, row) in enumerate(zip(wheel_names(values.shape[1]), values.T, strict=True)):
+def _plot_wheel_curves(
+    axis: Axes, times: np.ndarray, values_of_wheels: np.ndarray, title: str, axis_label: str
+) -> None:
+    for i, (name, row) in enumerate(zip(wheel_names(values_of_wheels.shape[1]), values_of_wheels.T, strict=True)):
         axis.plot(times, row, color=WHEEL_COLOURS[i], lw=0.8, label=name)
-    axis.set(xlabel="time [s]", ylabel=label, title=title)
+    axis.set(xlabel="time [s]", ylabel=axis_label, title=title)
 
 
-def _plot_lean(axis: Axes, times: np.ndarray, lean: np.ndarray) -> None:
+def _plot_roll_and_pitch(axis: Axes, times: np.ndarray, roll_and_pitch: np.ndarray) -> None:
     """Plot roll and pitch of the body (n, 2) in rad over times (n,) in s."""
     for values, colour, label in zip(
-        np.degrees(lean).T, WHEEL_COLOURS[::2], ("roll, to the right", "pitch, nose down"), strict=False
+        np.degrees(roll_and_pitch).T, WHEEL_COLOURS[::2], ("roll, to the right", "pitch, nose down"), strict=False
     ):
         axis.plot(times, values, color=colour, label=label)
     axis.set(xlabel="time [s]", ylabel="angle [deg]", title="Roll and pitch of the body")
@@ -169,14 +176,18 @@ def unit_outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
     return boxes
 
 
-def positions_on_road(unit: int, corners: np.ndarray, positions: np.ndarray, plane: PlaneVehicle) -> np.ndarray:
+def positions_on_road(
+    unit_number: int, corners: np.ndarray, positions: np.ndarray, plane_vehicle: PlaneVehicle
+) -> np.ndarray:
     """Positions (m, 2) on the road, in m, of points (m, 2) fixed to a unit of a train. positions (2 + U,) : x, y (m) of
     the vehicle and the yaw angles (rad) of its U units."""
-    return np.array([chain_point_position(ChainPoint(unit, x, y), positions, plane.reach) for x, y in corners])
+    return np.array(
+        [chain_point_position(ChainPoint(unit_number, x, y), positions, plane_vehicle.reach) for x, y in corners]
+    )
 
 
-def _box_outline(front: float, rear: float) -> np.ndarray:
-    front_end, behind = front + OUTLINE_OVERHANG, rear - OUTLINE_OVERHANG
+def _box_outline(front_position: float, rear_position: float) -> np.ndarray:
+    front_end, behind = front_position + OUTLINE_OVERHANG, rear_position - OUTLINE_OVERHANG
     return np.array(
         [
             [front_end, HALF_WIDTH],
@@ -188,7 +199,7 @@ def _box_outline(front: float, rear: float) -> np.ndarray:
     )
 
 
-def draw_path_from_above(axis: Axes, scene: BrakingScene, name: str, stop: StopHistory) -> None:
+def draw_path_from_above(axis: Axes, scene: BrakingScene, procedure_name: str, stop: StopHistory) -> None:
     """Draw the path from above on the road's surfaces, with the vehicle's outline at a few times."""
     x, y = stop.path.states[:, 0, :2].T
     low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0
@@ -202,13 +213,13 @@ def draw_path_from_above(axis: Axes, scene: BrakingScene, name: str, stop: StopH
     surfaces_named = set[str]()
     starts = [first] + [s.x for s in scene.road.stretches[1:]] + [largest_x]
     for stretch, begin, end in zip(scene.road.stretches, starts[:-1], starts[1:], strict=True):
-        left, right = surfaces_of_stretch(scene.procedures[name], stretch)
+        left, right = surfaces_of_stretch(scene.procedures[procedure_name], stretch)
         for surface, bottom, top in ((left, scene.road.line, high), (right, low, scene.road.line)):
             axis.fill_between(
                 [max(begin, first), min(end, largest_x)],
                 bottom,
                 top,
-                color=GROUND_COLOURS.get(surface, OTHER_SURFACE),
+                color=GROUND_COLOURS.get(surface, OTHER_SURFACE_COLOUR),
                 lw=0,
                 label=None if surface in surfaces_named else surface,
             )

@@ -23,16 +23,16 @@ from models.core.errors import InputError
 from models.core.result import Result
 from models.core.strict import Strict, read
 from models.ensemble.workers import Crew, folders_for_workers
-from studies.command.asked import ANY_SYSTEM, load_scene, plan_of
+from studies.command.asked import ANY_SYSTEM, load_scene, plan_module_of
 
 SYSTEM = ANY_SYSTEM
 ACTIVE_SHARE, BLIND_CHANGE = 0.1, 1e-3
 """Share of the energy activity above which an element is active; relative change below which a quantity ignores it."""
 LOWEST_CHANGE, HIGHEST_CHANGE = 1e-3, 1e3
 """Ends of the axis of changes (per cent); smaller or larger changes are drawn at the ends."""
-ELEMENTS_DRAWN = 8
+DRAWN_ELEMENT_LIMIT = 8
 """Largest number of elements whose energy activity is drawn, the most active first."""
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 class Options(Strict):
@@ -43,17 +43,17 @@ class Options(Strict):
 
 @dataclass(frozen=True)
 class SingleEffect:
-    """A single effect of a scene. changes (quantities,) : predicted relative changes if only this effect is left out,
-    inf if it cannot be; work_ratio : work of the complete scene, at the steps that accuracy allows, divided by the work
-    without the effect at the longest step then allowed."""
+    """A single effect of a scene. predicted_changes (quantities,) : predicted relative changes if only this effect is
+    left out, inf if it cannot be; work_ratio : work of the complete scene, at the steps that accuracy allows, divided
+    by the work without the effect at the longest step then allowed."""
 
     effect: str
-    changes: np.ndarray
+    predicted_changes: np.ndarray
     work_ratio: float
 
 
 @dataclass(frozen=True)
-class SceneChoice:
+class SceneEffectChoice:
     """The choice of effects for a scene, and the changes by each single effect. further_tolerances : tolerance above
     which a staying effect would be left out, too; activity_of_element : energy activity (W) by element, if it has a
     closed form. results: runs of the reduced scene, with their errors."""
@@ -81,32 +81,40 @@ def check(scene: Any, engines: tuple[str, ...]) -> None:
             raise InputError(scene.file, "options.beside", name, 'asks for no choice: it has no effects = "auto"')
 
 
-def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(scene: Any, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress) -> dict[str, Any]:
     """Choose the effects of the scene and of further scenes; saves a CSV table for each scene, and a figure."""
     check(scene, engines)
     further_scenes = [load_scene(name, None) for name in scene.options.get("beside", [])]
-    return save_choices([scene, *further_scenes], engines, folder, progress)
+    return save_choices([scene, *further_scenes], engines, output_folder, report_progress)
 
 
-def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def save_choices(
+    scenes: list[Any], engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Choose, save and draw the effects of scenes, the first in one of ``engines``; returns the summary."""
-    scene, choices = scenes[0], list[SceneChoice]()
+    scene, choices = scenes[0], list[SceneEffectChoice]()
     for i, chosen_scene in enumerate(scenes):
-        progress(chosen_scene.title, i / len(scenes))
+        report_progress(chosen_scene.title, i / len(scenes))
         linear, engines_asked = has_closed_form(chosen_scene), engines if chosen_scene is scene else ()
-        plan_of(chosen_scene).check(chosen_scene, () if linear else (engine_for_choice(chosen_scene, engines_asked),))
+        plan_module_of(chosen_scene).check(
+            chosen_scene, () if linear else (engine_for_choice(chosen_scene, engines_asked),)
+        )
         report_share = partial(
-            _pass_progress, progress, f"{chosen_scene.title}, of at most {SEARCH_BUDGET_IN_RUNS} runs", i, len(scenes)
+            _pass_progress,
+            report_progress,
+            f"{chosen_scene.title}, of at most {SEARCH_BUDGET_IN_RUNS} runs",
+            i,
+            len(scenes),
         )
         choices.append(
             _linear_ride_choice(chosen_scene) if linear else choice_of_scene(chosen_scene, engines_asked, report_share)
         )
-        _save_effect_table(choices[-1], folder / f"{i + 1}_{chosen_scene.system.replace('-', '_')}.csv")
-    progress("figure", 1.0)
-    choice_figure(choices, folder / "choice.png")
+        _save_effect_table(choices[-1], output_folder / f"{i + 1}_{chosen_scene.system.replace('-', '_')}.csv")
+    report_progress("figure", 1.0)
+    choice_figure(choices, output_folder / "choice.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "answer": [_summary_of_choice(choice) for choice in choices],
         "table": [line for choice in choices for line in choice_lines(choice, len(choices) > 1)],
@@ -114,25 +122,27 @@ def save_choices(scenes: list[Any], engines: tuple[str, ...], folder: Path, prog
     }
 
 
-def _results_by_name(choices: list[SceneChoice]) -> dict[str, Result]:
+def _results_by_name(scene_choices: list[SceneEffectChoice]) -> dict[str, Result]:
     """Results of the reduced scenes of all choices, by a name of the system (if there are several) and the run's
     number."""
     return {
         " ".join(
             (
-                *([choice.scene.system] if choices[1:] else []),
+                *([choice.scene.system] if scene_choices[1:] else []),
                 f"what is left{f', run {i + 1}' if choice.results[1:] else ''}",
             )
         ): run
-        for choice in choices
+        for choice in scene_choices
         for i, run in enumerate(choice.results)
     }
 
 
-def _pass_progress(progress: Progress, title: str, completed: int, scene_count: int, share: float) -> None:
-    """Report progress over several scenes: ``completed`` scenes are done, and ``share`` of the search of the current
-    scene."""
-    progress(title, (completed + share) / scene_count)
+def _pass_progress(
+    report_progress: ReportProgress, scene_title: str, completed_scenes: int, scene_count: int, share: float
+) -> None:
+    """Report progress over several scenes: ``completed_scenes`` scenes are done, and ``share`` of the search of the
+    current scene."""
+    report_progress(scene_title, (completed_scenes + share) / scene_count)
 
 
 def has_closed_form(scene: Any) -> bool:
@@ -151,7 +161,7 @@ def engine_for_choice(scene: Any, engines: tuple[str, ...]) -> str:
     return usual if not engines or usual in engines else engines[0]
 
 
-def search_text(scene: Any) -> str:
+def search_effort_text(scene: Any) -> str:
     """Line for the screen on the number of runs that the search for a scene's choice of effects may take."""
     if has_closed_form(scene):
         from models.advice.ride_choice.estimate import estimate
@@ -171,13 +181,13 @@ def search_text(scene: Any) -> str:
 
 
 def choice_of_scene(
-    scene: Any, engines: tuple[str, ...], progress: Callable[[float], None] = lambda share: None
-) -> SceneChoice:
+    scene: Any, engines: tuple[str, ...], report_progress: Callable[[float], None] = lambda share: None
+) -> SceneEffectChoice:
     """The choice of effects for a scene by runs in one engine."""
     engine = engine_for_choice(scene, engines)
     with Crew.of(scene, default_workers=1).at_work(PAIRS_COMPUTED_IN_ADVANCE, *folders_for_workers(scene)) as pool:
         chooser = EffectChooser(
-            scene, engine, scene.quantities, scene.tolerance, report_progress=progress, executor=pool
+            scene, engine, scene.quantities, scene.tolerance, report_progress=report_progress, executor=pool
         )
         choice, full_work = chooser.choose(), chooser.predicted_work(frozenset())
     results = (
@@ -193,12 +203,12 @@ def choice_of_scene(
         )
         for effect in chooser.effects
     ]
-    return SceneChoice(
+    return SceneEffectChoice(
         scene, engine, choice, single_effects, chooser.change_if_left_out_too(frozenset(choice.left_out)), {}, results
     )
 
 
-def _linear_ride_choice(scene: Any) -> SceneChoice:
+def _linear_ride_choice(scene: Any) -> SceneEffectChoice:
     """The choice of effects for a linear stationary ride scene in closed form; numbers of calls are for one second of
     motion."""
     from models.advice.ride_choice.activity import activity_by_element
@@ -237,10 +247,10 @@ def _linear_ride_choice(scene: Any) -> SceneChoice:
         0,
         0.0,
     )
-    return SceneChoice(scene, "closed form", choice, single_effects, further, watts)
+    return SceneEffectChoice(scene, "closed form", choice, single_effects, further, watts)
 
 
-def _summary_of_choice(scene_choice: SceneChoice) -> dict[str, Any]:
+def _summary_of_choice(scene_choice: SceneEffectChoice) -> dict[str, Any]:
     """Entry of the summary for a choice: its effects, their changes and the saving."""
     choice = scene_choice.choice
     return {
@@ -267,18 +277,18 @@ def _summary_of_choice(scene_choice: SceneChoice) -> dict[str, Any]:
     }
 
 
-def _save_effect_table(choice: SceneChoice, path: Path) -> None:
+def _save_effect_table(scene_choice: SceneEffectChoice, table_path: Path) -> None:
     """Save a CSV file with a row per effect: the changes if only this effect is left out, the saved work, and whether
     it was left out."""
-    with path.open("x", newline="") as file:
+    with table_path.open("x", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        heads = [f"{name}, change [-]" for name in choice.scene.quantities]
+        heads = [f"{name}, change [-]" for name in scene_choice.scene.quantities]
         writer.writerow(["effect", "left out", *heads, "times less work alone [-]", "would break"])
-        for effect in choice.single_effects:
-            values = map(repr, effect.changes.tolist())
-            broken = "; ".join(breach.says for breach in choice.choice.assumptions_barring.get(effect.effect, ()))
+        for effect in scene_choice.single_effects:
+            values = map(repr, effect.predicted_changes.tolist())
+            broken = "; ".join(breach.says for breach in scene_choice.choice.assumptions_barring.get(effect.effect, ()))
             writer.writerow(
-                [effect.effect, effect.effect in choice.choice.left_out, *values, repr(effect.work_ratio), broken]
+                [effect.effect, effect.effect in scene_choice.choice.left_out, *values, repr(effect.work_ratio), broken]
             )
 
 
@@ -292,7 +302,7 @@ def _change_text(relative_change: float, uncertainty: float) -> str:
     return percent_text(relative_change) + (f" +- {percent_text(uncertainty)}" if uncertainty else "")
 
 
-def _why_it_stays(relative_change: float, scene_choice: SceneChoice) -> str:
+def _reason_to_stay_text(relative_change: float, scene_choice: SceneEffectChoice) -> str:
     """Text on why an effect stays: how much the quantities would change if it were left out, too."""
     if (
         relative_change > TOLERANCE_SHARE_OF_PREDICTION * scene_choice.scene.tolerance
@@ -306,7 +316,7 @@ def _why_it_stays(relative_change: float, scene_choice: SceneChoice) -> str:
     )
 
 
-def choice_lines(scene_choice: SceneChoice, with_title: bool) -> list[str]:
+def choice_lines(scene_choice: SceneEffectChoice, with_title: bool) -> list[str]:
     """Lines for the screen on the choice of a scene's effects."""
     choice, scene = scene_choice.choice, scene_choice.scene
     rows = [
@@ -332,7 +342,7 @@ def choice_lines(scene_choice: SceneChoice, with_title: bool) -> list[str]:
             f"longer steps with all effects; CPU seconds {faster:.3g} times fewer, once"
         )
     rows += [
-        f"    {name} {_why_it_stays(change, scene_choice)}"
+        f"    {name} {_reason_to_stay_text(change, scene_choice)}"
         for name, change in sorted(scene_choice.further_tolerances.items(), key=lambda item: item[1])
     ]
     rows += [
@@ -349,18 +359,18 @@ def choice_lines(scene_choice: SceneChoice, with_title: bool) -> list[str]:
         rows.append(
             f"    chance alone stands in the way of more: {choice.sample_factor:.2g} times as many samples would tell"
         )
-    rows += misleading_activities(scene_choice)
+    rows += misleading_activity_lines(scene_choice)
     worst = float((choice.confirmed_change + choice.statistical_error).max())
     return [*rows, f"    the choice holds for tolerances down to {percent_text(worst)}"] if choice.left_out else rows
 
 
-def misleading_activities(scene_choice: SceneChoice) -> list[str]:
+def misleading_activity_lines(scene_choice: SceneEffectChoice) -> list[str]:
     """Lines for the screen on inertias for which energy activity misleads: active ones without which a quantity hardly
     changes."""
     total, rows = sum(value for value in scene_choice.activity_of_element.values() if np.isfinite(value)), []
     for effect in scene_choice.single_effects:
         share = scene_choice.activity_of_element.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
-        for name, change in zip(scene_choice.scene.quantities, effect.changes, strict=True):
+        for name, change in zip(scene_choice.scene.quantities, effect.predicted_changes, strict=True):
             if np.isfinite(share) and share > ACTIVE_SHARE and change < BLIND_CHANGE:
                 rows.append(
                     f"    energy activity misleads: {effect.effect} holds {percent_text(share)} of it, and without "
@@ -369,15 +379,15 @@ def misleading_activities(scene_choice: SceneChoice) -> list[str]:
     return rows
 
 
-def choice_figure(choices: list[SceneChoice], path: Path) -> None:
+def choice_figure(scene_choices: list[SceneEffectChoice], figure_path: Path) -> None:
     """Save a figure with a panel of changes per scene, and a panel of energy activities if there are any."""
     from models.drawing.figures import COLUMN_WIDTH, add_heading, save, subplots
 
-    shown = [(choice, False) for choice in choices] + [
-        (choice, True) for choice in choices if choice.activity_of_element
+    shown = [(choice, False) for choice in scene_choices] + [
+        (choice, True) for choice in scene_choices if choice.activity_of_element
     ]
     heights = [
-        1.5 + 0.2 * (ELEMENTS_DRAWN if active else max(len(choice.single_effects), 4)) for choice, active in shown
+        1.5 + 0.2 * (DRAWN_ELEMENT_LIMIT if active else max(len(choice.single_effects), 4)) for choice, active in shown
     ]
     figure, axes = subplots(
         len(shown), 1, figsize=(COLUMN_WIDTH, sum(heights) + 0.5), squeeze=False, height_ratios=heights
@@ -385,11 +395,11 @@ def choice_figure(choices: list[SceneChoice], path: Path) -> None:
     for axis, (choice, active) in zip(axes.flat, shown, strict=True):
         _plot_activity(axis, choice) if active else _plot_changes(axis, choice)
     title = "Which effects matter for which question: change by leaving out one effect, against the tolerance"
-    add_heading(figure, title, _results_by_name(choices))
-    save(figure, path)
+    add_heading(figure, title, _results_by_name(scene_choices))
+    save(figure, figure_path)
 
 
-def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
+def _plot_changes(axis: Any, scene_choice: SceneEffectChoice) -> None:
     """Plot how much each quantity changes if a single effect is left out, for each effect.
 
     Shaded rows, from the scene's tolerance on, tell why an effect stays; a name says whether it went with the others.
@@ -398,11 +408,11 @@ def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
 
     shown = sorted(
         scene_choice.single_effects,
-        key=lambda effect: float(np.nan_to_num(effect.changes, posinf=HIGHEST_CHANGE).max()),
+        key=lambda effect: float(np.nan_to_num(effect.predicted_changes, posinf=HIGHEST_CHANGE).max()),
     )
     y = np.arange(len(shown))
     for i, name in enumerate(scene_choice.scene.quantities):
-        values = np.array([effect.changes[i] for effect in shown])
+        values = np.array([effect.predicted_changes[i] for effect in shown])
         axis.plot(
             np.clip(np.where(np.isfinite(values), 100 * values, np.nan), LOWEST_CHANGE, HIGHEST_CHANGE),
             y,
@@ -412,7 +422,7 @@ def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
             label=name.partition(" [")[0],
         )
     for row, effect in zip(y, shown, strict=True):
-        if not np.isfinite(effect.changes).all():
+        if not np.isfinite(effect.predicted_changes).all():
             axis.text(HIGHEST_CHANGE, row, "cannot go alone", ha="right", va="center", fontsize=SMALL_TEXT)
     barred = [
         row for row, effect in zip(y, shown, strict=True) if effect.effect in scene_choice.choice.assumptions_barring
@@ -440,7 +450,7 @@ def _plot_changes(axis: Any, scene_choice: SceneChoice) -> None:
     axis.legend(fontsize=SMALL_TEXT, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def _effect_label(scene_choice: SceneChoice, effect: SingleEffect) -> str:
+def _effect_label(scene_choice: SceneEffectChoice, effect: SingleEffect) -> str:
     """Label of an effect with "(left out)" or "(stays)". An effect whose own change is small may stay, since it can
     matter together with others that were left out."""
     return effect.effect.replace("_", " ") + (
@@ -448,12 +458,12 @@ def _effect_label(scene_choice: SceneChoice, effect: SingleEffect) -> str:
     )
 
 
-def _plot_activity(axis: Any, scene_choice: SceneChoice) -> None:
+def _plot_activity(axis: Any, scene_choice: SceneEffectChoice) -> None:
     from models.drawing.figures import BLUE
 
     finite = {name: value for name, value in scene_choice.activity_of_element.items() if np.isfinite(value)}
     total = sum(finite.values())
-    shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS_DRAWN][::-1]
+    shown = sorted(finite.items(), key=lambda item: -item[1])[:DRAWN_ELEMENT_LIMIT][::-1]
     axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color=BLUE, alpha=0.7)
     axis.set(
         title=f"{scene_choice.scene.system}: energy activity, which knows neither the question nor pairs",

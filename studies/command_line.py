@@ -20,18 +20,24 @@ from models.core.whole_files import write_error_phrase
 from models.machine.left_out import OF_LABELS, leave_out
 from models.measured.file_kinds import is_measurement
 from studies.command.asked import (
-    check_by_any,
+    check_for_any_engine,
     checked_study,
     doubt_lines,
-    engines_of,
-    findings_of,
+    input_findings_of,
     load_scene,
-    needs_no_extras,
-    plan_of,
+    plan_module_of,
+    requested_engines,
+    runs_without_extras,
 )
 from studies.command.audits import blind_spot_audit, conformity_report
 from studies.command.crew import crew_changes_by_options
-from studies.command.finishing import exit_with_message, finish, folder_of, profiled_work, unprinted_finding_lines
+from studies.command.finishing import (
+    exit_with_message,
+    profiling_wrapper,
+    results_folder_of,
+    run_and_print_summary,
+    unprinted_finding_lines,
+)
 from studies.command.options import (
     ClusterOption,
     JsonOption,
@@ -120,31 +126,35 @@ def show(
         return print(describe(Path(scene)))
     loaded = load_scene(scene, changes)
     if not price:
-        check_by_any(loaded, engines_of(getattr(getattr(loaded, "run", None), "engine", None), loaded.system))
-        plan = plan_of(loaded).describe(loaded)
-        return print("\n".join([plan, *unprinted_finding_lines(findings_of(loaded), plan), *_search_lines(loaded)]))
+        check_for_any_engine(
+            loaded, requested_engines(getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
+        )
+        plan = plan_module_of(loaded).describe(loaded)
+        return print(
+            "\n".join([plan, *unprinted_finding_lines(input_findings_of(loaded), plan), *_search_lines(loaded)])
+        )
     _announce_user_code(loaded)
     from models.advice.price.effects import price_list
     from models.advice.price.effects_text import as_dict
     from models.advice.price.effects_text import price_list_lines as price_lines
 
     with progress_bar("short runs with and without each effect", loaded.system):
-        prices = price_list(loaded, None if engine is None else engines_of(engine, loaded.system)[0])
+        prices = price_list(loaded, None if engine is None else requested_engines(engine, loaded.system)[0])
     print(json.dumps(as_dict(prices), indent=1) if as_json else "\n".join(price_lines(prices, loaded.quantities)))
 
 
 def _announce_user_code(scene: Any) -> None:
     """Print on stderr that code of the user is about to run many times, if the scene has any."""
-    code = getattr(plan_of(scene), "user_code", lambda scene: "")(scene)
+    code = getattr(plan_module_of(scene), "user_code", lambda scene: "")(scene)
     if code:
         print(f"twinrig: this runs your own code, many times: [port] {code}", file=sys.stderr, flush=True)
 
 
 def _search_lines(scene: Any) -> list[str]:
     """Lines for the screen on the number of runs that a choice of effects may take, if the scene asks for a choice."""
-    from studies.choice import search_text
+    from studies.choice import search_effort_text
 
-    return [] if scene.tolerance is None else [search_text(scene)]
+    return [] if scene.tolerance is None else [search_effort_text(scene)]
 
 
 @app.command("run")
@@ -163,7 +173,7 @@ def run_scene(
     as_json: JsonOption = False,
 ) -> None:
     """Run a scene and save its results and figures."""
-    telling = profiled_work(profile)
+    telling = profiling_wrapper(profile)
     if out is not None:
         check_unused(out)  # before kernels are compiled
     if sweep is not None:
@@ -173,23 +183,25 @@ def run_scene(
 
         job = sweep_points(sweep, scene, changes or (), engine, not no_error)
         crew = crew_of(job.check(), workers, cluster)
-        folder = folder_of(f"{Path(scene).stem}-sweep", RECORDS_FOLDER, "", out, resume)
-        work = partial(run_points, replace(job, folder=folder), crew=crew)
-        return finish(telling(work), folder, as_json, strict=strict)
+        folder = results_folder_of(f"{Path(scene).stem}-sweep", RECORDS_FOLDER, "", out, resume)
+        work = partial(run_points, replace(job, output_folder=folder), crew=crew)
+        return run_and_print_summary(telling(work), folder, as_json, is_strict=strict)
     loaded = load_scene(scene, changes)
     loaded = loaded.model_copy(
         update={"error": loaded.error and not no_error, **crew_changes_by_options(workers, cluster)}
     )
-    engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
+    engines = requested_engines(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
     with _doubts_printed_on_refusal(loaded), second_process_compiles(scene, changes or [], loaded, engines):
         with progress_bar("checking the scene", loaded.system):
             module = checked_study(loaded, engines)
-        if needs_no_extras(loaded, engines, module):
+        if runs_without_extras(loaded, engines, module):
             leave_out(*OF_LABELS)
-        folder = folder_of(Path(loaded.file).stem, getattr(module, "BLOCKS_FOLDER", None), loaded.study, out, resume)
-        doubts = findings_of(loaded)
+        folder = results_folder_of(
+            Path(loaded.file).stem, getattr(module, "BLOCKS_FOLDER", None), loaded.study, out, resume
+        )
+        doubts = input_findings_of(loaded)
         work = partial(module.run, loaded, engines, folder)
-        finish(telling(work), folder, as_json, doubts, strict, loaded.system)
+        run_and_print_summary(telling(work), folder, as_json, doubts, strict, loaded.system)
 
 
 @contextmanager
@@ -226,7 +238,7 @@ def price(
     loaded = load_scene(scene, changes).model_copy(update=crew_changes_by_options(workers, cluster))
     _announce_user_code(loaded)
     with progress_bar("runs of every engine in ever finer steps", loaded.system):
-        priced = price_of(loaded, tolerance, quantity, engines_of(engine, loaded.system))
+        priced = price_of(loaded, tolerance, quantity, requested_engines(engine, loaded.system))
     print(json.dumps(as_dict(priced), indent=1) if as_json else "\n".join(price_lines(priced)))
     if not priced.winners:
         sys.exit(1)
@@ -256,13 +268,13 @@ def compare(
     if measured.is_run_against_measurement(first, second):
         for run in measured.saved_results(first).values():
             measured.overlay_of_run(run, second, shift)  # before a folder is made
-        folder = folder_of("compare", None, "", out, None)
-        return finish(lambda progress: measured.report(first, second, folder, shift), folder, as_json)
+        folder = results_folder_of("compare", None, "", out, None)
+        return run_and_print_summary(lambda progress: measured.report(first, second, folder, shift), folder, as_json)
     if shift is not None:
         raise InputError("--shift", "", shift, "belongs to a comparison of a run with a measurement")
     differences(first, second)  # before a folder is made
-    folder = folder_of("compare", None, "", out, None)
-    finish(lambda progress: report(first, second, folder), folder, as_json)
+    folder = results_folder_of("compare", None, "", out, None)
+    run_and_print_summary(lambda progress: report(first, second, folder), folder, as_json)
 
 
 @app.command()
@@ -289,17 +301,17 @@ def identify(
     if not keys:
         raise InputError("--parameters", "", parameters, "must name keys of the scene, as front.friction,rear.friction")
     loaded = loaded.model_copy(update=crew_changes_by_options(workers, cluster))
-    engines = engines_of(engine, loaded.system)
+    engines = requested_engines(engine, loaded.system)
     checked_study(loaded, engines)
     if not measurement.is_file():
         raise InputError(measurement, "--from", None, "no such file")
-    folder = folder_of(f"{Path(loaded.file).stem}-identify", STAGES_FOLDER, "", out, resume)
+    folder = results_folder_of(f"{Path(loaded.file).stem}-identify", STAGES_FOLDER, "", out, resume)
     usual = engines[0] if engines else ""
 
-    def computed(tell: Callable[[str, float], None]) -> dict[str, Any]:
-        return report(loaded, measurement, keys, folder, tell, profiles, engine=usual, low_pass=low_pass)
+    def computed(report_progress: Callable[[str, float], None]) -> dict[str, Any]:
+        return report(loaded, measurement, keys, folder, report_progress, profiles, engine=usual, low_pass=low_pass)
 
-    finish(computed, folder, as_json, (), False, loaded.system)
+    run_and_print_summary(computed, folder, as_json, (), False, loaded.system)
 
 
 @app.command()
@@ -339,7 +351,7 @@ def twin(
     controls: Annotated[
         Path | None, typer.Option(help="CSV of the actuators' controls over time, for the paths; constant if none.")
     ] = None,
-    folder: Annotated[
+    output_folder: Annotated[
         Path | None, typer.Option(help="Folder from which includes, meshes and pictures may come; the model's if none.")
     ] = None,
 ) -> None:
@@ -352,7 +364,7 @@ def twin(
 
     check_arguments(files, page)
     with progress_bar("building the model") as tell:
-        twin_options = TwinOptions(states, compare_paths, tolerance, quantity, controls, folder)
+        twin_options = TwinOptions(states, compare_paths, tolerance, quantity, controls, output_folder)
         twins = examine(files, listed_content_kinds(without), twin_options, tell)
     print("\n".join(twin_lines(twins)))
     if page is not None:
@@ -398,7 +410,7 @@ def validate(
     from validation.run import validate as run_all
 
     earlier = None if against is None else read_results(against)
-    folder = folder_of("validate-quick" if quick else "validate", FINISHED_CASES, "", out, resume)
+    folder = results_folder_of("validate-quick" if quick else "validate", FINISHED_CASES, "", out, resume)
     try:
         command = " ".join(["twinrig", *sys.argv[1:]])
         failed = run_all(folder, quick, command, earlier, resume is not None, Crew.given(**crew))

@@ -9,10 +9,12 @@ from models.systems.wheelset import conicity
 from models.systems.wheelset.scene import WheelsetScene
 
 SYSTEM = "wheelset"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
-def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: WheelsetScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute both equivalent conicities at each amplitude; saves ``conicity.nc``, ``conicity.csv``,
     ``rolling_radii.csv`` and a figure, and returns the summary.
 
@@ -20,15 +22,15 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     """
     from studies.wheelset_figures import conicity_figure
 
-    conicities = conicity.run(scene, lambda share: progress("rolling radii", 0.9 * share))
+    conicities = conicity.run(scene, lambda share: report_progress("rolling radii", 0.9 * share))
     conicity.refuse_without_wave(scene, conicities.detail)
-    conicities.save(folder / "conicity.nc")
-    conicities.save_table(folder / "conicity.csv", "amplitude", *conicity.CONICITY_CHANNELS)
-    conicities.detail.save_table(folder / "rolling_radii.csv")
-    conicity_figure(conicities, scene.title, folder / "conicity.png")
+    conicities.save(output_folder / "conicity.nc")
+    conicities.save_table(output_folder / "conicity.csv", "amplitude", *conicity.CONICITY_CHANNELS)
+    conicities.detail.save_table(output_folder / "rolling_radii.csv")
+    conicity_figure(conicities, scene.title, output_folder / "conicity.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "answer": conicity.conicity_numbers(conicities),
         "results": {"conicity": conicities},

@@ -20,8 +20,8 @@ from models.systems.contact.run import ContactResults, fields_by_cell, inputs_of
 from models.systems.contact.scene import ContactMethod, ContactScene
 
 SYSTEM = "contact"
-Progress = Callable[[str, float], None]
-PRINTED_ROWS = 12
+ReportProgress = Callable[[str, float], None]
+PRINTED_ROW_LIMIT = 12
 """Approximate number of rows of a sweep that are printed; the saved file has all."""
 
 
@@ -38,24 +38,26 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
         raise InputError(scene.file, "study", scene.study, allowed)
 
 
-def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: ContactScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute the normal contact and the creep forces; saves forces and fields as CSV and netCDF, and figures; returns
     the summary."""
     check(scene, engines)
-    forces = run_scene(scene, error=scene.error, fields=True, progress=progress)
+    forces = run_scene(scene, error=scene.error, fields=True, progress=report_progress)
     rolls: ContactResults = forces.detail
     for name, saved in (("forces", forces), ("fields", fields_by_cell(scene, rolls))):
         if saved is not None:
-            saved.save(folder / f"{name}.nc")
-            saved.save_table(folder / f"{name}.csv")
-    progress("figures", 0.9)
-    _draw_figures(scene, forces, folder)
+            saved.save(output_folder / f"{name}.nc")
+            saved.save_table(output_folder / f"{name}.csv")
+    report_progress("figures", 0.9)
+    _draw_figures(scene, forces, output_folder)
     body, doubts = rolls.contact, json.loads(forces.data.attrs["doubts"])
     rows = forces.data.to_dataframe().to_dict("records")
     answer = asdict(body.pressing) | {"friction": body.friction, "forces": rows, "doubt": "".join(doubts)}
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "answer": answer,
         "results": {"forces": forces},
@@ -63,10 +65,10 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def _table_lines(scene: ContactScene, forces: Result) -> list[str]:
+def _table_lines(scene: ContactScene, creep_forces: Result) -> list[str]:
     """Lines for the screen: the normal contact, then creep forces with errors, at all creepages or at some of a
     sweep."""
-    rolls: ContactResults = forces.detail
+    rolls: ContactResults = creep_forces.detail
     body, p = rolls.contact, rolls.contact.pressing
     limit = body.friction * p.load
     size = f"a = {1e3 * body.a:.3f} mm, b = {1e3 * body.b:.3f} mm, " if isinstance(body, RollingOnEllipse) else ""
@@ -83,21 +85,23 @@ def _table_lines(scene: ContactScene, forces: Result) -> list[str]:
         + "   errors: of cells, of theory [% of mu N], of Mz [N m]"
         * bool(rolls.errors),
     ]
-    step = max(1, (len(rolls.motions) - 1) // PRINTED_ROWS)
+    step = max(1, (len(rolls.motions) - 1) // PRINTED_ROW_LIMIT)
     errors: Sequence[ContactErrors | None] = rolls.errors or [None] * len(rolls.motions)
     for motion, force, error in list(zip(rolls.motions, rolls.rolled, errors, strict=True))[::step]:
         lines.append(
             f"    {motion[0]:>10.3g}{motion[1]:>10.3g}{motion[2]:>11.3g}{round(force.fx):>10,}"
             f"{round(force.fy):>10,}{force.mz:>10.3f}{force.stick:>7.0%}{force.dissipation:>10.3g}"
-            + ("" if error is None else _errors_text(error, limit))
+            + ("" if error is None else _force_errors_text(error, limit))
         )
     loss = "  loss: power by the rolling speed"
     return [*lines, loss + "; errors are of the force, that of Mz has both together" * bool(rolls.errors)]
 
 
-def _errors_text(error: ContactErrors, friction_limit: float) -> str:
-    cells, theory = (_percent_text(error_part, friction_limit) for error_part in (error.cells, error.theory))
-    return f"   {cells:>6}{theory:>8}{error.moment:>9.2g}"
+def _force_errors_text(force_error: ContactErrors, friction_limit_force: float) -> str:
+    cells, theory = (
+        _percent_text(error_part, friction_limit_force) for error_part in (force_error.cells, force_error.theory)
+    )
+    return f"   {cells:>6}{theory:>8}{force_error.moment:>9.2g}"
 
 
 THEORY_NAMES = {
@@ -108,13 +112,15 @@ THEORY_NAMES = {
 }
 
 
-def theory_text(method: ContactMethod) -> str:
+def theory_text(contact_theory: ContactMethod) -> str:
     """Name of a contact theory, with its number of cells along each axis if it has cells."""
-    return THEORY_NAMES[method.name] + ("" if method.name == "linear" else f", {method.cells} cells along each axis")
+    return THEORY_NAMES[contact_theory.name] + (
+        "" if contact_theory.name == "linear" else f", {contact_theory.cells} cells along each axis"
+    )
 
 
-def _percent_text(error: float, friction_limit: float) -> str:
-    return f"{100 * error / friction_limit:.2f}" if friction_limit > 0 else "0"
+def _percent_text(force_error: float, friction_limit_force: float) -> str:
+    return f"{100 * force_error / friction_limit_force:.2f}" if friction_limit_force > 0 else "0"
 
 
 def _contact_point_lines(scene: ContactScene) -> list[str]:
@@ -128,10 +134,10 @@ def _contact_point_lines(scene: ContactScene) -> list[str]:
     ]
 
 
-def _draw_figures(scene: ContactScene, forces: Result, folder: Path) -> None:
-    from studies.contact_figures import contact_figure, sweep_figure
+def _draw_figures(scene: ContactScene, creep_forces: Result, output_folder: Path) -> None:
+    from studies.contact_figures import contact_figure, creepage_sweep_figure
 
-    rolls: ContactResults = forces.detail
+    rolls: ContactResults = creep_forces.detail
     motion, last_rolled, sweep = rolls.motions[-1], rolls.rolled[-1], scene.sweep
     if last_rolled.fields:
         title = (
@@ -142,7 +148,12 @@ def _draw_figures(scene: ContactScene, forces: Result, folder: Path) -> None:
         )
         friction = rolls.contact.friction
         contact_figure(
-            list(last_rolled.fields), friction, title, _pressure_name(rolls.contact), forces, folder / "contact.png"
+            list(last_rolled.fields),
+            friction,
+            title,
+            _pressure_name(rolls.contact),
+            creep_forces,
+            output_folder / "contact.png",
         )
     if sweep is not None:
         note_on_others = "".join(
@@ -151,16 +162,18 @@ def _draw_figures(scene: ContactScene, forces: Result, folder: Path) -> None:
             if value and name != sweep.of
         )
         title = f"{scene.title}\nForces by {theory_text(scene.method)}{note_on_others}"
-        sweep_figure(sweep, forces, _exact_checks(scene, rolls), title, folder / "forces.png")
+        creepage_sweep_figure(
+            sweep, creep_forces, _exact_theory_results(scene, rolls), title, output_folder / "forces.png"
+        )
 
 
 CREEPAGE_SYMBOLS = (("ξx", ""), ("ξy", ""), ("spin", " 1/m"))
 
 
-def _pressure_name(body: RollingContact) -> str:
+def _pressure_name(rolling_contact: RollingContact) -> str:
     """Name of the pressure distribution over a contact's cells, for a figure's title."""
-    if isinstance(body, FastsimTheory) and body.choices["bound"] != "elliptic":
-        return f"FASTSIM's pressure ({body.choices['bound']} bound)"
+    if isinstance(rolling_contact, FastsimTheory) and rolling_contact.choices["bound"] != "elliptic":
+        return f"FASTSIM's pressure ({rolling_contact.choices['bound']} bound)"
     return "pressure"
 
 
@@ -168,7 +181,7 @@ EXACT_THEORY_CELLS = 40
 """Number of cells along each axis of the exact theory that checks a sweep."""
 
 
-def _exact_checks(scene: ContactScene, contact_results: ContactResults) -> dict[int, Any]:
+def _exact_theory_results(scene: ContactScene, contact_results: ContactResults) -> dict[int, Any]:
     """Results of the exact theory at a few creepages of a sweep, by the number of the creepage. Empty if the contact is
     no Hertzian ellipse, is exact already, or has falling friction."""
     body, points = contact_results.contact, read(Options, scene.options, scene.file, "options").exact

@@ -38,28 +38,34 @@ ARROW_COUNT = 17
 
 
 def contact_figure(
-    patches: list[ContactFields], friction: float, title: str, pressure: str, forces: Result, path: Path
+    contact_patches: list[ContactFields],
+    friction_coefficient: float,
+    title: str,
+    pressure_name: str,
+    creep_forces: Result,
+    figure_path: Path,
 ) -> None:
-    """Save a figure of pressure and tractions over the contact area, with all patches to scale; ``pressure`` names the
+    """Save a figure of pressure and tractions over the contact area, with all patches to scale. pressure_name : of the
     pressure distribution.
 
-    forces : the result whose last motion is shown.
+    creep_forces : the result whose last motion is shown.
     """
     length, width = (
-        MILLIMETRES_PER_METRE * np.ptp(np.concatenate([getattr(f, name)[f.inside] for f in patches])) for name in "xy"
+        MILLIMETRES_PER_METRE * np.ptp(np.concatenate([getattr(f, name)[f.inside] for f in contact_patches]))
+        for name in "xy"
     )
     size = COLUMN_WIDTH, float(np.clip(3.2 * width / length + 1.9, 3.8, 8.0))
     figure, axes = subplots(1, 2, figsize=size, sharex=True, sharey=True)
-    _draw_pressure(axes[0], patches, pressure)
-    _draw_tractions(axes[1], patches, friction, max(length, width) / ARROW_COUNT)
+    _draw_pressure(axes[0], contact_patches, pressure_name)
+    _draw_tractions(axes[1], contact_patches, friction_coefficient, max(length, width) / ARROW_COUNT)
     for axis in axes:
         axis.set(aspect="equal", xlabel="x, direction of rolling [mm]")
         axis.grid(visible=False)
     for axis in axes:
         axis.set_ylabel("y, to the right [mm]")
     axes[0].invert_yaxis()  # as seen from above, where x is ahead
-    add_heading(figure, title, {"forces": forces})
-    save(figure, path)
+    add_heading(figure, title, {"forces": creep_forces})
+    save(figure, figure_path)
 
 
 def _cell_corners(fields_on_cells: ContactFields) -> list[Array]:
@@ -72,9 +78,9 @@ def _cell_corners(fields_on_cells: ContactFields) -> list[Array]:
     return list(np.array(corners).transpose(2, 0, 1))
 
 
-def _draw_pressure(axis: Any, patches: list[ContactFields], quantity: str) -> None:
-    greatest = MEGAPASCAL_PER_PASCAL * max(float(f.pressure.max()) for f in patches)
-    for f in patches:
+def _draw_pressure(axis: Any, contact_patches: list[ContactFields], quantity: str) -> None:
+    greatest = MEGAPASCAL_PER_PASCAL * max(float(f.pressure.max()) for f in contact_patches)
+    for f in contact_patches:
         cells = PolyCollection(
             _cell_corners(f),
             array=MEGAPASCAL_PER_PASCAL * f.pressure[f.inside],
@@ -89,37 +95,41 @@ def _draw_pressure(axis: Any, patches: list[ContactFields], quantity: str) -> No
     axis.set_title(f"{quantity[0].upper()}{quantity[1:]},\nlargest {greatest:,.0f} MPa")
 
 
-def _draw_tractions(axis: Any, patches: list[ContactFields], friction: float, spacing: float) -> None:
-    """Draw the zones of stick and slip, and arrows of the traction on the wheel at a ``spacing`` (mm)."""
-    largest = friction * max(float(f.pressure.max()) for f in patches)
-    scaled: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": largest / (1.35 * spacing)}
-    for f in patches:
+def _draw_tractions(
+    axis: Any, contact_patches: list[ContactFields], friction_coefficient: float, arrow_spacing: float
+) -> None:
+    """Draw the zones of stick and slip, and arrows of the traction on the wheel at a ``arrow_spacing`` (mm)."""
+    largest = friction_coefficient * max(float(f.pressure.max()) for f in contact_patches)
+    scaled: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": largest / (1.35 * arrow_spacing)}
+    for f in contact_patches:
         colours = np.where(f.slips[f.inside], SLIP_COLOUR, STICK_COLOUR)
         axis.add_collection(PolyCollection(_cell_corners(f), facecolor=colours, edgecolor="face", linewidth=0.2))
-        x, y, px, py = _arrow_data(f, spacing / MILLIMETRES_PER_METRE)
+        x, y, px, py = _traction_arrows(f, arrow_spacing / MILLIMETRES_PER_METRE)
         arrows = axis.quiver(
             MILLIMETRES_PER_METRE * x, MILLIMETRES_PER_METRE * y, px, py, **scaled, width=0.004, color=DARK
         )
     axis.quiverkey(arrows, 0.9, 1.03, largest, f"{MEGAPASCAL_PER_PASCAL * largest:,.0f} MPa", labelpos="W")
     marks = [Rectangle((0, 0), 1, 1, facecolor=colour) for colour in (STICK_COLOUR, SLIP_COLOUR)]
-    area = np.concatenate([(f.dx * f.dy)[f.inside] for f in patches])
-    slip = float(area[np.concatenate([f.slips[f.inside] for f in patches])].sum() / area.sum())
+    area = np.concatenate([(f.dx * f.dy)[f.inside] for f in contact_patches])
+    slip = float(area[np.concatenate([f.slips[f.inside] for f in contact_patches])].sum() / area.sum())
     labels = [f"stick, {100 * (1 - slip):.0f} % of the area", f"slip, {100 * slip:.0f} %"]
     axis.figure.legend(marks, labels, loc="outside lower right", ncols=2)
     axis.set_title("Traction on the wheel,\nand where it sticks and slips")
 
 
-def _arrow_data(fields_on_cells: ContactFields, spacing: float) -> Array:
+def _traction_arrows(fields_on_cells: ContactFields, arrow_spacing: float) -> Array:
     """Positions x, y (m) and tractions (Pa) of the arrows, (4, n), at evenly spaced points along some rows of cells,
     between which tractions are interpolated."""
     arrows, lines = list[Array](), fields_on_cells.y[:, 0]
-    step = max(1, round(spacing / float(fields_on_cells.dy[0, 0])))
+    step = max(1, round(arrow_spacing / float(fields_on_cells.dy[0, 0])))
     for row in range(len(lines) // 2 % step, len(lines), step):
         cells_inside = np.flatnonzero(fields_on_cells.inside[row])
         cells_inside = cells_inside[np.argsort(fields_on_cells.x[row, cells_inside])]
         if cells_inside.size:
             x = fields_on_cells.x[row, cells_inside]
-            arrow_positions = np.arange(np.ceil(x[0] / spacing), np.floor(x[-1] / spacing) + 1) * spacing
+            arrow_positions = (
+                np.arange(np.ceil(x[0] / arrow_spacing), np.floor(x[-1] / arrow_spacing) + 1) * arrow_spacing
+            )
             values = (
                 np.interp(arrow_positions, x, traction[row, cells_inside])
                 for traction in (fields_on_cells.px, fields_on_cells.py)
@@ -132,26 +142,35 @@ CREEPAGE_LABELS = {"xi_x": "longitudinal creepage [%]", "xi_y": "lateral creepag
 FORCE_COLOURS = {"fx": BLUE, "fy": VERMILION, "mz": GREEN}
 
 
-def sweep_figure(
-    sweep: CreepageSweep, forces: Result, exact_results: dict[int, RollingResult], title: str, path: Path
+def creepage_sweep_figure(
+    creepage_sweep: CreepageSweep,
+    creep_forces: Result,
+    exact_results: dict[int, RollingResult],
+    title: str,
+    figure_path: Path,
 ) -> None:
     """Save a figure of creep forces and moment over a creepage, with error bands and some results of the exact theory.
 
-    forces : those of the scene, and their errors; exact_results : results of the exact theory by the number of the
-    motion.
+    creep_forces : those of the scene, and their errors; exact_results : results of the exact theory by the number of
+    the motion.
     """
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
-    values, body = (1.0 if sweep.of == "spin" else 100.0) * sweep.values(), forces.detail.contact
+    values, body = (
+        (1.0 if creepage_sweep.of == "spin" else 100.0) * creepage_sweep.values(),
+        creep_forces.detail.contact,
+    )
     limit = 1e-3 * body.friction * body.pressing.load
-    stated, no_error = "error_of_cells" in forces.data, 0.0 * values
-    error = 1e-3 * (forces["error_of_cells"] + forces["error_of_theory"]) if stated else no_error
-    moment_error = forces["moment_error_of_cells"] + forces["moment_error_of_theory"] if stated else no_error
+    stated, no_error = "error_of_cells" in creep_forces.data, 0.0 * values
+    error = 1e-3 * (creep_forces["error_of_cells"] + creep_forces["error_of_theory"]) if stated else no_error
+    moment_error = (
+        creep_forces["moment_error_of_cells"] + creep_forces["moment_error_of_theory"] if stated else no_error
+    )
     for axis, name, label, scale, error_band, force_bound in (
         (left, "fx", "Fx", 1e-3, error, limit),
         (left, "fy", "Fy", 1e-3, error, limit),
         (right, "mz", None, 1.0, moment_error, np.inf),
     ):
-        colour, force = FORCE_COLOURS[name], scale * forces[name]
+        colour, force = FORCE_COLOURS[name], scale * creep_forces[name]
         low, high = (
             np.clip(force - error_band, -force_bound, force_bound),
             np.clip(force + error_band, -force_bound, force_bound),
@@ -165,15 +184,15 @@ def sweep_figure(
     left.set(title="Force on the wheel; dotted: ±μN", ylabel="tangential force [kN]")
     right.set(title="Moment on the wheel about the normal", ylabel="Mz [N m]")
     for axis in (left, right):
-        axis.set_xlabel(CREEPAGE_LABELS[sweep.of])
-        axis.set_xscale("log" if sweep.spacing == "logarithmic" and sweep.start > 0 else "linear")
+        axis.set_xlabel(CREEPAGE_LABELS[creepage_sweep.of])
+        axis.set_xscale("log" if creepage_sweep.spacing == "logarithmic" and creepage_sweep.start > 0 else "linear")
     if stated:
         left.fill_between([], [], color=GREY, alpha=0.3, linewidth=0, label="error of cells and theory")
     if exact_results:
         left.plot([], [], "o", color=DARK, markerfacecolor="white", markersize=5, label="exact theory")
     legend_below(figure, left)
-    add_heading(figure, title, {"forces": forces})
-    save(figure, path)
+    add_heading(figure, title, {"forces": creep_forces})
+    save(figure, figure_path)
 
 
 THEORY_STYLES = {
@@ -188,11 +207,11 @@ THEORY_STYLES = {
 }
 
 
-LARGEST_ERROR = 60.0
+LARGEST_DRAWN_ERROR = 60.0
 """Largest error (% of mu N) that the figure shows."""
 
 
-def price_figure(price: Result, title: str) -> Figure:
+def price_figure(price_result: Result, title: str) -> Figure:
     """Figure of the error of every contact theory over its number of cells and over its computing time, on logarithmic
     axes. Bars reach up to the error that 95 % of the contacts do not exceed.
 
@@ -200,7 +219,7 @@ def price_figure(price: Result, title: str) -> Figure:
     """
     widths = (1.3, 1.0, 1.0)
     figure, axes = subplots(1, 3, figsize=(COLUMN_WIDTH, 4.6), sharey=True, width_ratios=widths)
-    points: list[TheoryPoint] = price.detail
+    points: list[TheoryPoint] = price_result.detail
     for name in THEORY_STYLES:
         line = [point for point in points if point.name == name]
         if line:
@@ -218,22 +237,24 @@ def price_figure(price: Result, title: str) -> Figure:
             axis.axhline(100 * target, color=DARK, linewidth=0.6, linestyle=":")
     axes[0].set_yticks([0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50], ["0.1", "0.2", "0.5", "1", "2", "5", "10", "20", "50"])
     axes[0].yaxis.set_minor_locator(NullLocator())
-    axes[0].set(ylim=(0.1, LARGEST_ERROR), xlim=(30.0, None), ylabel="mean error of the tangential force [% of μN]")
+    axes[0].set(
+        ylim=(0.1, LARGEST_DRAWN_ERROR), xlim=(30.0, None), ylabel="mean error of the tangential force [% of μN]"
+    )
     legend_below(figure, axes[0])
-    add_heading(figure, title, {"price": price})
+    add_heading(figure, title, {"price": price_result})
     return figure
 
 
 def _plot_theory(
-    axis: Any, name: str, points: list[TheoryPoint], x_values: list[float], with_bar: bool = False
+    axis: Any, theory_name: str, theory_points: list[TheoryPoint], x_values: list[float], with_bar: bool = False
 ) -> None:
     """Plot the mean error (% of mu N) of a contact theory. An optional bar at its largest number of cells reaches up to
     the error that 95 % of the contacts do not exceed."""
-    colour, marker = THEORY_STYLES[name]
+    colour, marker = THEORY_STYLES[theory_name]
     mean, largest_errors = (
-        100 * np.array([getattr(point, key) for point in points]) for key in ("mean", "quantile_95")
+        100 * np.array([getattr(point, key) for point in theory_points]) for key in ("mean", "quantile_95")
     )
-    label = name if mean[0] < LARGEST_ERROR else f"{name}: {mean[0]:.0f} %"
+    label = theory_name if mean[0] < LARGEST_DRAWN_ERROR else f"{theory_name}: {mean[0]:.0f} %"
     axis.plot(x_values, mean, color=colour, marker=marker, linewidth=1.3, markersize=4.5, label=label)
     if with_bar:
         axis.plot([x_values[-1]] * 2, [mean[-1], largest_errors[-1]], color=colour, linewidth=0.8)

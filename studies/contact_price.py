@@ -16,7 +16,7 @@ from models.systems.contact.scene import ContactScene
 from models.systems.contact.work_precision import TheoryPoint, cheapest_lines, priced_theories
 
 SYSTEM = "contact"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 class Options(Strict):
@@ -41,24 +41,26 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
         raise InputError(scene.file, "options.levels", options.levels, "must be above 0 and at most 100")
 
 
-def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: ContactScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute errors and times of every theory with every number of cells; saves ``price.nc``, ``price.png`` and
     ``table.txt``, and returns the summary."""
     check(scene, engines)
-    price = priced_theories(scene, tuple(read(Options, scene.options, scene.file, "options").levels), progress)
-    price.save(folder / "price.nc")
+    price = priced_theories(scene, tuple(read(Options, scene.options, scene.file, "options").levels), report_progress)
+    price.save(output_folder / "price.nc")
     points, uncertain = price.detail, price["uncertainty"]
     table = _table_lines(points, uncertain.size, uncertain.max())
-    write_whole(folder / "table.txt", "\n".join(table) + "\n")
+    write_whole(output_folder / "table.txt", "\n".join(table) + "\n")
     from models.drawing.figures import save
     from studies.contact_figures import price_figure
 
     a, b = (1e3 * price.data.attrs[axis] for axis in "ab")
     title = f"What accuracy costs: a = {a:.2f} mm, b = {b:.2f} mm, {uncertain.size} contacts"
-    save(price_figure(price, title), folder / "price.png")
+    save(price_figure(price, title), output_folder / "price.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "results": {"price": price},
         "points": [asdict(point) for point in points],
@@ -66,7 +68,7 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def _table_lines(points: list[TheoryPoint], contact_count: int, reference_uncertainty: float) -> list[str]:
+def _table_lines(theory_points: list[TheoryPoint], contact_count: int, reference_uncertainty: float) -> list[str]:
     """Lines for the screen: errors and times of all theories and cells, then the cheapest theory for each target
     error."""
     return [
@@ -76,10 +78,13 @@ def _table_lines(points: list[TheoryPoint], contact_count: int, reference_uncert
         *(
             f"    {point.name:<28}{point.cells:>6}{100 * point.mean:>8.2f}{100 * point.quantile_95:>11.2f}"
             f"{100 * max(point.errors):>9.2f}   {cost((point.seconds, *point.range))}"
-            for point in points
+            for point in theory_points
         ),
         "  cheapest that meets      in the mean; in 95 of 100 contacts",
-        *(f"    {target:>6}  {mean};  {largest_cheapest}" for target, mean, largest_cheapest in cheapest_lines(points)),
+        *(
+            f"    {target:>6}  {mean};  {largest_cheapest}"
+            for target, mean, largest_cheapest in cheapest_lines(theory_points)
+        ),
     ]
 
 

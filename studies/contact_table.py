@@ -13,7 +13,7 @@ from models.systems.contact.scene import ContactScene
 
 __all__ = ["BLOCKS_FOLDER"]  # what --resume goes on from
 SYSTEM = "contact"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
@@ -24,16 +24,18 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
     scene.cases_file()
 
 
-def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: ContactScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute the forces of every row into ``forces.csv``; saves the first rows and the magnitudes of all as
     ``forces.nc``, and returns the summary."""
     check(scene, engines)
-    rows = run_scene(scene, error=scene.error, answers=folder / "forces.csv", progress=progress)
-    rows.save(folder / "forces.nc")
+    rows = run_scene(scene, error=scene.error, answers=output_folder / "forces.csv", progress=report_progress)
+    rows.save(output_folder / "forces.nc")
     counts = rows.counts()
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "rows": counts,
         "answer": json.loads(rows.data.attrs["sizes"]),
@@ -43,18 +45,20 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def summary_lines(row_count: int, wrong_row_count: int, name: str, seconds: float, errors: bool = True) -> list[str]:
-    """Lines for the screen on the number of computed rows of the file ``name``, the number of wrong rows, and the
+def summary_lines(
+    row_count: int, wrong_row_count: int, file_name: str, computing_seconds: float, has_errors: bool = True
+) -> list[str]:
+    """Lines for the screen on the number of computed rows of the file ``file_name``, the number of wrong rows, and the
     computing time (s)."""
     if row_count == 0:
-        return [f"  no rows in {name}"]
+        return [f"  no rows in {file_name}"]
     sound = ", all of them sound" if row_count > 1 else ", sound"
     state = f"; {wrong_row_count:,} of them wrong, see their status" if wrong_row_count else sound
-    row_time_text = f", {duration(seconds / row_count)} a row" if row_count > 1 else ""
-    twice = " twice for the error of cells" if errors else ""
+    row_time_text = f", {duration(computing_seconds / row_count)} a row" if row_count > 1 else ""
+    twice = " twice for the error of cells" if has_errors else ""
     return [
-        f"  {row_count:,} row{'s' * (row_count > 1)} of {name}{state}",
-        f"  {duration(seconds)}{row_time_text}, once: reading, forces{twice}, writing",
+        f"  {row_count:,} row{'s' * (row_count > 1)} of {file_name}{state}",
+        f"  {duration(computing_seconds)}{row_time_text}, once: reading, forces{twice}, writing",
     ]
 
 

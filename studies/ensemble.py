@@ -35,12 +35,12 @@ from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.virtual_measurement import check_road, follower_builder, measure, write_measurement
 from models.vehicles.pitch_plane import STATE_NAMES
 
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 BLOCKS_FOLDER = "blocks"
 """Name of the folder of finished blocks in the results' folder; a study with this constant can be resumed."""
 PITCH_QUANTILES = (0.05, 0.5, 0.95)
-HEAVE_STATE = 2
+HEAVE_STATE_INDEX = 2
 """Index of the heave in the state."""
 
 
@@ -78,7 +78,7 @@ def check(scene: Scene, engines: tuple[str, ...]) -> Options:
     return options
 
 
-def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress) -> dict[str, Any]:
     """Run all noise paths in the reference, and the first paths in the other engines; saves ``ensemble.nc``, a table
     and a figure, and returns the summary."""
     options = check(scene, engines)
@@ -88,7 +88,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     statistics = PathStatistics(true, max(options.saved, options.engine_paths))
 
     def tell(finished: Done) -> None:
-        progress(f"reference: {finished}", finished.done / finished.paths)
+        report_progress(f"reference: {finished}", finished.done / finished.paths)
 
     crew, cut = Crew.of(scene), PathBlocks(options.block)
     with TemporaryDirectory() as name, crew.at_work(cut.count(options.paths)) as pool:
@@ -98,12 +98,12 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         first = run_with_drift(noisy, "reference", scene.error)
         path_arguments = (noisy, row_times, measured["pitch"], options.threshold)
         for block in arrays_by_block(
-            noise_paths(*path_arguments), options.paths, folder / BLOCKS_FOLDER, pool, cut, tell
+            noise_paths(*path_arguments), options.paths, output_folder / BLOCKS_FOLDER, pool, cut, tell
         ):
             statistics.add(block)
         gaps = {}
         for engine in (engine for engine in engines if engine != "reference"):
-            progress(f"{engine}: {options.engine_paths} of the same paths", 1.0)
+            report_progress(f"{engine}: {options.engine_paths} of the same paths", 1.0)
             if engine == "mujoco":
                 repeated = run_paths(mujoco_threads(*path_arguments, crew.workers), options.engine_paths)
             else:
@@ -111,18 +111,18 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
                     noise_paths(*path_arguments, engine), options.engine_paths, executor=pool, path_blocks=PathBlocks(1)
                 )
             gaps[engine] = largest_difference(statistics.first, repeated, row_times)
-    write_measurement(measured, folder, period)
+    write_measurement(measured, output_folder, period)
     rows = _deviation_rows(options, row_times, statistics)
     channels, axes = _result_channels(row_times, statistics, options.saved)
     saved = result(noisy, channels, axes, engine="reference", threshold=options.threshold)
-    _with_errors(saved, first, rows, options, statistics).save(folder / "ensemble.nc")
+    _with_stated_errors(saved, first, rows, options, statistics).save(output_folder / "ensemble.nc")
     table = summary_lines(options, scene, rows, statistics, gaps)
-    write_whole(folder / "table.txt", "\n".join(table) + "\n")
+    write_whole(output_folder / "table.txt", "\n".join(table) + "\n")
     results = {"measurement": measured, "all paths": saved}
-    _figure(row_times, statistics, options, results, folder)
+    _figure(row_times, statistics, options, results, output_folder)
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "results": results,
         "paths": options.paths,
         "rows": rows,
@@ -133,102 +133,115 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
 
 
 def _result_channels(
-    times: np.ndarray, statistics: PathStatistics, saved_paths: int
+    times: np.ndarray, path_statistics: PathStatistics, saved_paths: int
 ) -> tuple[dict[str, Channel], dict[str, Channel]]:
     """Channels and axes of the saved result: the first paths, and statistics over all paths."""
-    paths = {name: values[:saved_paths] for name, values in statistics.first.items()}
+    paths = {name: values[:saved_paths] for name, values in path_statistics.first.items()}
     units, names = "m, rad, m/s, rad/s", list(STATE_NAMES)
     channels = {
         "states": Channel(("path", "time", "state"), paths["states"], units),
         "drift_off": Channel("path", paths["drift_off"], "s", "drift-off, infinite if never"),
         "failed": Channel("path", paths["failed"], "s", "last good time of a path that failed"),
         "mean_error": Channel(
-            ("time", "state"), statistics.covariance.mean, units, "mean of all paths less the true one"
+            ("time", "state"), path_statistics.covariance.mean, units, "mean of all paths less the true one"
         ),
         "covariance": Channel(
-            ("time", "state", "other_state"), statistics.covariance.covariance, units, "of all paths"
+            ("time", "state", "other_state"), path_statistics.covariance.covariance, units, "of all paths"
         ),
         "drift_offs": Channel(
-            "drift_off_time", statistics.drift_off.counts, "-", "number of all paths that drifted off"
+            "drift_off_time", path_statistics.drift_off.counts, "-", "number of all paths that drifted off"
         ),
     }
     axes = {
         "time": Channel("time", times, "s"),
         "state": Channel("state", names),
         "other_state": Channel("other_state", names),
-        "drift_off_time": Channel("drift_off_time", statistics.drift_off.values, "s"),
+        "drift_off_time": Channel("drift_off_time", path_statistics.drift_off.values, "s"),
     }
     return channels, axes
 
 
-def _with_errors(
-    result: Result, first_path: Result, rows: list[dict[str, float]], options: Options, statistics: PathStatistics
+def _with_stated_errors(
+    ensemble_result: Result,
+    first_path: Result,
+    deviation_rows: list[dict[str, float]],
+    study_options: Options,
+    path_statistics: PathStatistics,
 ) -> Result:
     """The ensemble's result with two stated errors: the step error, estimated on the first path, and the standard
     errors of the standard deviations."""
     error = json.loads(first_path.data.attrs["error"])
-    result.data.attrs["error"] = json.dumps(error | ({"how": f"{error['how']}, of the first path"} if error else {}))
+    ensemble_result.data.attrs["error"] = json.dumps(
+        error | ({"how": f"{error['how']}, of the first path"} if error else {})
+    )
     worst = {
-        name: sampling_error(row[f"{name} error"], row[name], unit, options.paths)
+        name: sampling_error(row[f"{name} error"], row[name], unit, study_options.paths)
         for name, unit in (("pitch", "rad"), ("heave", "m"))
-        for row in [max(rows, key=lambda row: row[f"{name} error"] / (row[name] or 1.0))]
+        for row in [max(deviation_rows, key=lambda row: row[f"{name} error"] / (row[name] or 1.0))]
     }
     assumed = [
         upright_assumption(
-            "end the runs before, or hold their pitch (kalman_filter)", lambda run: _largest_pitch(statistics)
+            "end the runs before, or hold their pitch (kalman_filter)", lambda run: _largest_pitch(path_statistics)
         )
     ]
     return with_sampling_error(
-        with_assumptions(result, assumed),
+        with_assumptions(ensemble_result, assumed),
         {f"deviation of {name}": breach for name, breach in worst.items()},
-        options.paths,
+        study_options.paths,
     )
 
 
-def _largest_pitch(statistics: PathStatistics) -> Watched:
+def _largest_pitch(path_statistics: PathStatistics) -> Watched:
     """Largest pitch (rad) over all paths at each time, for the check of an assumption; NaN where no path remains."""
-    return {"any path": statistics.steepest}
+    return {"any path": path_statistics.steepest}
 
 
-def _deviation_rows(options: Options, times: np.ndarray, statistics: PathStatistics) -> list[dict[str, float]]:
+def _deviation_rows(
+    study_options: Options, times: np.ndarray, path_statistics: PathStatistics
+) -> list[dict[str, float]]:
     """Standard deviations of pitch (rad) and heave (m), with standard errors, at the times (s) that the options
     list."""
     names, rows = ("time", "pitch", "pitch error", "heave", "heave error"), []
-    for time in options.times:
-        row = round(time / options.rows)
-        pitch, heave = (statistics.moments.deviation(row, state) for state in (PITCH_STATE, HEAVE_STATE))
+    for time in study_options.times:
+        row = round(time / study_options.rows)
+        pitch, heave = (path_statistics.moments.deviation(row, state) for state in (PITCH_STATE, HEAVE_STATE_INDEX))
         figures = (float(times[row]), *pitch, *heave)
         rows.append(dict(zip(names, figures, strict=True)))
     return rows
 
 
 def summary_lines(
-    options: Options,
+    study_options: Options,
     scene: Scene,
-    rows: list[dict[str, float]],
-    statistics: PathStatistics,
+    deviation_rows: list[dict[str, float]],
+    path_statistics: PathStatistics,
     engine_differences: dict[str, float],
 ) -> list[str]:
     """Lines for the screen: standard deviations over time, quantiles of the drift-off time, and differences of
     engines."""
     lines = [
-        f"  {options.paths} paths of {scene.run.duration:g} s, forces at {options.sampling_rate:g} Hz, noise "
-        f"{100 * options.noise_fraction:g} % of the largest force",
+        f"  {study_options.paths} paths of {scene.run.duration:g} s, forces at {study_options.sampling_rate:g} Hz, "
+        f"noise {100 * study_options.noise_fraction:g} % of the largest force",
         "  time [s]   sd of pitch [rad]         sd of heave [m]",
     ]
     lines += [
         f"  {row['time']:8g}   {row['pitch']:.3e} +- {row['pitch error']:.0e}   "
         f"{row['heave']:.3e} +- {row['heave error']:.0e}"
-        for row in rows
+        for row in deviation_rows
     ]
-    lines.append(f"  Drift-off ({options.threshold:g} rad), quantiles with their 95 % intervals [s]")
+    lines.append(f"  Drift-off ({study_options.threshold:g} rad), quantiles with their 95 % intervals [s]")
     for level in PITCH_QUANTILES:
-        value, low, high = statistics.drift_off.quantile(level)
+        value, low, high = path_statistics.drift_off.quantile(level)
         lines.append(f"  {100 * level:7g} %   {_time_text(value)}   ({_time_text(low)} to {_time_text(high)})")
-    lines += [f"  {statistics.lost} paths left all bounds and count as drifted off by then"] if statistics.lost else []
+    lines += (
+        [f"  {path_statistics.lost} paths left all bounds and count as drifted off by then"]
+        if path_statistics.lost
+        else []
+    )
     for engine, worst in engine_differences.items():
         differ = (
-            f"{options.engine_paths} of these paths differ by at most {worst:.0e} of the largest state before drift-off"
+            f"{study_options.engine_paths} of these paths differ by at most {worst:.0e} of the largest state "
+            "before drift-off"
         )
         not_compared = "not compared, as every path drifts off before the first saved row"
         lines.append(f"  {engine}: {not_compared if math.isnan(worst) else differ}")
@@ -239,33 +252,43 @@ def _time_text(seconds: float) -> str:
     return f"{seconds:.2f}" if np.isfinite(seconds) else "never"
 
 
-def _figure(times: np.ndarray, statistics: PathStatistics, options: Options, results: Results, folder: Path) -> None:
+def _figure(
+    times: np.ndarray,
+    path_statistics: PathStatistics,
+    study_options: Options,
+    shown_results: Results,
+    output_folder: Path,
+) -> None:
     """Save a figure of percentiles of the pitch error over time, and of a histogram of the drift-off times."""
 
     from models.drawing.drift import draw_quantile_bands
     from models.drawing.figures import BLUE, COLUMN_WIDTH, DARK, add_heading, save, subplots
 
     figure, (fan, histogram) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8), width_ratios=(3, 2))
-    draw_quantile_bands(fan, times[1:], statistics.pitch_error_percentiles[:, 1:])
+    draw_quantile_bands(fan, times[1:], path_statistics.pitch_error_percentiles[:, 1:])
     fan.axhline(
-        options.threshold, color=DARK, linestyle="--", linewidth=0.8, label=f"drift-off, {options.threshold:g} rad"
+        study_options.threshold,
+        color=DARK,
+        linestyle="--",
+        linewidth=0.8,
+        label=f"drift-off, {study_options.threshold:g} rad",
     )
     fan.legend(loc="lower right")
-    has_drifted = np.isfinite(statistics.drift_off.values)
-    drifted, counts = statistics.drift_off.values[has_drifted], statistics.drift_off.counts[has_drifted]
+    has_drifted = np.isfinite(path_statistics.drift_off.values)
+    drifted, counts = path_statistics.drift_off.values[has_drifted], path_statistics.drift_off.counts[has_drifted]
     histogram.hist(drifted, bins=40, weights=counts, color=BLUE, alpha=0.6)
     for level, style in zip(PITCH_QUANTILES, (":", "-", ":"), strict=True):
-        value = statistics.drift_off.quantile(level)[0]
+        value = path_statistics.drift_off.quantile(level)[0]
         if np.isfinite(value):
             histogram.axvline(value, color=DARK, linestyle=style, label=f"{100 * level:g} %: {value:.1f} s")
-    histogram.set_title(f"Drift-offs: paths [-] ({options.paths - counts.sum()} never)")
+    histogram.set_title(f"Drift-offs: paths [-] ({study_options.paths - counts.sum()} never)")
     if len(drifted):
         histogram.legend()
     for axes in (fan, histogram):
         axes.set_xlabel("time [s]")
-    title = f"{options.paths} noise paths of one measured run, forces at {options.sampling_rate:g} Hz"
-    add_heading(figure, title, results)
-    save(figure, folder / "ensemble.png")
+    title = f"{study_options.paths} noise paths of one measured run, forces at {study_options.sampling_rate:g} Hz"
+    add_heading(figure, title, shown_results)
+    save(figure, output_folder / "ensemble.png")
 
 
 if __name__ == "__main__":

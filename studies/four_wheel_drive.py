@@ -18,13 +18,13 @@ DURATION, SAMPLING_RATE, START_SPEED = 30.0, 50, 20.0
 """Duration (s), sampling rate (Hz), and initial speed (m/s)."""
 NOISE_DEVIATIONS = {"yaw rate": 0.004, "lateral acceleration": 0.3, "side slip": 0.0008}
 """Standard deviations (rad/s, m/s^2, rad) of the white noise on every sample of the measured channels."""
-SEED = 20
+RANDOM_SEED = 20
 Knots = list[list[float]]
 
 
 def random_controls() -> dict[str, Knots]:
     """Random steer angle (rad), drive and brake torque (N m), as lists of [time (s), value]."""
-    random = np.random.default_rng(SEED)
+    random = np.random.default_rng(RANDOM_SEED)
     steer, drive, brake, time, side = [[0.5, 0.0]], [[0.5, 120.0]], [[0.5, 0.0]], 0.5, 1.0
     while time < DURATION - 4.0:
         angle = side * random.uniform(0.015, 0.055)
@@ -48,33 +48,33 @@ def simulated_drive() -> SimulatedDrive:
     return run_handling(build(table), "mujoco").detail
 
 
-def measured_columns(drive: SimulatedDrive) -> dict[str, tuple[str, np.ndarray]]:
+def measured_columns(car_drive: SimulatedDrive) -> dict[str, tuple[str, np.ndarray]]:
     """Columns (unit, sampled values) of a run, as a logger in the car would write them: inputs, speed and noisy
     sensors."""
-    stride = round(1.0 / (SAMPLING_RATE * float(drive.run.times[1] - drive.run.times[0])))
-    forward_speed, lateral_speed, yaw = drive.velocity().T
-    random = np.random.default_rng(SEED + 1)
-    front = drive["steer"][:, 0]
+    stride = round(1.0 / (SAMPLING_RATE * float(car_drive.run.times[1] - car_drive.run.times[0])))
+    forward_speed, lateral_speed, yaw = car_drive.velocity().T
+    random = np.random.default_rng(RANDOM_SEED + 1)
+    front = car_drive["steer"][:, 0]
     channels = {
         "yaw rate": ("rad/s", yaw),
-        "lateral acceleration": ("m/s^2", drive.lateral_acceleration()),
+        "lateral acceleration": ("m/s^2", car_drive.lateral_acceleration()),
         "side slip": ("rad", np.arctan2(lateral_speed, forward_speed)),
     }
     noisy = {
         name: (unit, values[::stride] + NOISE_DEVIATIONS[name] * random.standard_normal(len(values[::stride])))
         for name, (unit, values) in channels.items()
     }
-    plain = {"time": ("s", drive.run.times), "steer": ("rad", front), "speed": ("m/s", forward_speed)}
+    plain = {"time": ("s", car_drive.run.times), "steer": ("rad", front), "speed": ("m/s", forward_speed)}
     return {name: (unit, values[::stride]) for name, (unit, values) in plain.items()} | noisy
 
 
-def save(path: Path) -> None:
+def save_virtual_measurement(output_path: Path) -> None:
     """Write the virtual measurement to a CSV file, with six digits."""
     columns = measured_columns(simulated_drive())
     head = ",".join(f"{name} [{unit}]" for name, (unit, _) in columns.items())
     rows = zip(*(values.tolist() for _, values in columns.values()), strict=True)
-    write_whole(path, "\n".join([head, *(",".join(f"{value:.6g}" for value in row) for row in rows), ""]))
+    write_whole(output_path, "\n".join([head, *(",".join(f"{value:.6g}" for value in row) for row in rows), ""]))
 
 
 if __name__ == "__main__":
-    save(Path(sys.argv[1]))
+    save_virtual_measurement(Path(sys.argv[1]))

@@ -12,11 +12,13 @@ from models.systems.handling.run import run as run_scene
 from models.systems.handling.scene import HandlingScene
 
 SYSTEM = "handling"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 DIFFERENCE_TITLE = "largest difference of the engines"
 
 
-def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: HandlingScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Run every manoeuvre in every engine; saves NAME.nc with all engines' runs and NAME.png for each manoeuvre, and
     returns the summary."""
     from studies.handling_figures import manoeuvre_figure
@@ -25,17 +27,17 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
     for i, name in enumerate(scene.manoeuvres):
         runs = dict[str, Result]()
         for j, engine in enumerate(engines):
-            progress(f"{name}, {engine}", (i + j / len(engines)) / len(scene.manoeuvres))
+            report_progress(f"{name}, {engine}", (i + j / len(engines)) / len(scene.manoeuvres))
             try:
                 runs[engine] = run_scene(scene, engine, name, error=scene.error)
             except RunFailed as error:
                 failed[f"{name}, {engine}"] = str(error)
         if runs:
-            join_results(runs, "engine").save(folder / f"{name}.nc")
+            join_results(runs, "engine").save(output_folder / f"{name}.nc")
             title = name.replace("_", " ").capitalize() if len(scene.manoeuvres) > 1 else scene.title
-            manoeuvre_figure(runs, title, folder / f"{name}.png")
+            manoeuvre_figure(runs, title, output_folder / f"{name}.png")
             results |= {f"{name}, {engine}": run for engine, run in runs.items()}
-            answer[name] = _figures_of_runs(runs)
+            answer[name] = _key_figures_of_runs(runs)
             lines.append(_manoeuvre_line(name, answer[name]))
     head = (
         f"    {'':<16}{'largest':>26}{'least':>12}{'friction':>10}{'engines':>10}\n"
@@ -43,7 +45,7 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
     )
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": failed,
         "answer": answer,
         "results": results,
@@ -51,8 +53,8 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
     }
 
 
-def _figures_of_runs(runs: dict[str, Result]) -> dict[str, float]:
-    first, *other_runs = runs.values()
+def _key_figures_of_runs(runs_by_engine: dict[str, Result]) -> dict[str, float]:
+    first, *other_runs = runs_by_engine.values()
     drive = first.detail
     figures = {
         "largest yaw rate [rad/s]": np.abs(drive.velocity()[:, 2]).max(),
@@ -69,10 +71,10 @@ def _figures_of_runs(runs: dict[str, Result]) -> dict[str, float]:
     return {key: float(value) for key, value in figures.items()}
 
 
-def _manoeuvre_line(name: str, figures: dict[str, float]) -> str:
-    yaw, lateral, load, used = list(figures.values())[:4]
-    gap = f"{figures[DIFFERENCE_TITLE]:>10.1e}" if DIFFERENCE_TITLE in figures else ""
-    return f"    {name:<16}{yaw:>6.3f} rad/s{lateral:>8.2f} m/s^2{load:>10.0f} N{100 * used:>8.0f} %{gap}"
+def _manoeuvre_line(manoeuvre_name: str, run_figures: dict[str, float]) -> str:
+    yaw, lateral, load, used = list(run_figures.values())[:4]
+    gap = f"{run_figures[DIFFERENCE_TITLE]:>10.1e}" if DIFFERENCE_TITLE in run_figures else ""
+    return f"    {manoeuvre_name:<16}{yaw:>6.3f} rad/s{lateral:>8.2f} m/s^2{load:>10.0f} N{100 * used:>8.0f} %{gap}"
 
 
 if __name__ == "__main__":

@@ -25,10 +25,10 @@ CORNER_NAMES = {
 """Readable names of tyres; other tyres are called by their names in the vehicle file."""
 
 
-def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
+def manoeuvre_figure(runs_by_engine: Results, title: str, figure_path: Path) -> Path:
     """Save a figure of the first run of a manoeuvre: path, channels over time, and friction circle, a colour per
     tyre."""
-    drive: SimulatedDrive = next(iter(runs.values())).detail
+    drive: SimulatedDrive = next(iter(runs_by_engine.values())).detail
     figure, axes = panels(8, 2, 2.15)
     over_time, (path_axis, circle_axis) = [axes[i] for i in (1, 2, 3, 4, 5, 6)], (axes[0], axes[7])
     steer, turning, across, slips, loads, moments = over_time
@@ -53,8 +53,8 @@ def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
     _plot_friction_circle(circle_axis, drive)
     legend_below(figure, slips)
     start = f"from {drive.velocity()[0, 0]:g} m/s, friction {drive.handling.tyres.friction:g}"
-    add_heading(figure, f"{title}: {start}", runs)
-    return save(figure, path)
+    add_heading(figure, f"{title}: {start}", runs_by_engine)
+    return save(figure, figure_path)
 
 
 def _tyre_style(tyre_number: int) -> dict[str, Any]:
@@ -62,10 +62,10 @@ def _tyre_style(tyre_number: int) -> dict[str, Any]:
     return {"color": TYRE_COLOURS[tyre_number % 4], "linestyle": TYRE_LINES[tyre_number // 4 % 4]}
 
 
-def _plot_path(axis: Axes, drive: SimulatedDrive) -> None:
-    x, y, _ = drive.path.T
+def _plot_path(axis: Axes, car_drive: SimulatedDrive) -> None:
+    x, y, _ = car_drive.path.T
     axis.plot(x, y, color=DARK)
-    x, y_few, yaw = drive.path[:: max(1, len(x) // 8)].T
+    x, y_few, yaw = car_drive.path[:: max(1, len(x) // 8)].T
     arrows: dict[str, Any] = {"angles": "xy", "scale": 14, "width": 5e-3, "color": GREEN, "zorder": 3}
     axis.quiver(x, y_few, np.cos(yaw), np.sin(yaw), **arrows)
     axis.set(xlabel="x [m]", ylabel="y [m]", title="Path, and where the car points")
@@ -74,12 +74,14 @@ def _plot_path(axis: Axes, drive: SimulatedDrive) -> None:
     axis.set_ylim(low - 0.25 * (high - low) - 0.5, high + 0.25 * (high - low) + 0.5)
 
 
-def _plot_friction_circle(axis: Axes, drive: SimulatedDrive) -> None:
+def _plot_friction_circle(axis: Axes, car_drive: SimulatedDrive) -> None:
     """Plot the horizontal force of each tyre divided by mu N, which lies inside the unit circle."""
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     axis.plot(np.cos(turn), np.sin(turn), color=DARK, lw=0.8)
-    bound = np.where(drive["load"] > 0.0, drive.largest_tyre_forces(), 1.0)
-    for i, (side, longitudinal) in enumerate(zip((drive["fy"] / bound).T, (drive["fx"] / bound).T, strict=True)):
+    bound = np.where(car_drive["load"] > 0.0, car_drive.largest_tyre_forces(), 1.0)
+    for i, (side, longitudinal) in enumerate(
+        zip((car_drive["fy"] / bound).T, (car_drive["fx"] / bound).T, strict=True)
+    ):
         axis.plot(side, longitudinal, **_tyre_style(i), lw=0.9)
     axis.set(
         xlabel="side force / μN [-]",

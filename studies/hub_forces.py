@@ -25,18 +25,18 @@ def check(scene: HubScene, engines: tuple[str, ...]) -> None:
     read(Options, scene.options, scene.file, "options")
 
 
-def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(scene: HubScene, engines: tuple[str, ...], output_folder: Path, report_progress: Progress) -> dict[str, Any]:
     """Measure hub forces virtually; run the vehicle free, with the Kalman filter and with prescribed roll and pitch.
     Saves the measurement, all runs and two figures; returns the summary."""
     from studies.hub_forces_figures import damage_figure, drift_figure
 
-    comparison = compare_stabilisers(scene, engines, progress)
-    save(comparison, folder)
-    drift_figure(comparison, scene.title, folder / "drift.png")
-    damage_figure(comparison, scene.title, folder / "damage.png")
+    comparison = compare_stabilisers(scene, engines, report_progress)
+    save_measurement_and_runs(comparison, output_folder)
+    drift_figure(comparison, scene.title, output_folder / "drift.png")
+    damage_figure(comparison, scene.title, output_folder / "damage.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "answer": comparison.figures(),
         "results": comparison.results,
@@ -45,8 +45,8 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
     }
 
 
-def _table_lines(scene: HubScene, comparison: StabiliserComparison) -> list[str]:
-    known, tilt = comparison.truth is not None, comparison.measurement.tilt
+def _table_lines(scene: HubScene, run_comparison: StabiliserComparison) -> list[str]:
+    known, tilt = run_comparison.truth is not None, run_comparison.measurement.tilt
     error_heading = "largest error" if known else "largest difference"
     damage = "damage / true damage" if known else "damage / that with the filter"
     lines = [
@@ -56,10 +56,13 @@ def _table_lines(scene: HubScene, comparison: StabiliserComparison) -> list[str]
         f"  {error_heading:<18}{'[mrad]':>9}{'[mrad]':>9}{'[mrad]':>9}{'[m]':>8}{'[m]':>8}{'[m]':>8}{'[s]':>11}"
         f"{'[N m]':>16}   least, most",
     ]
-    for name, path in comparison.runs.items():
-        largest = np.abs(comparison.errors(path)).max(axis=0)
+    for name, path in run_comparison.runs.items():
+        largest = np.abs(run_comparison.errors(path)).max(axis=0)
         roll, pitch = np.sqrt(np.mean(path["holding_moment"] ** 2, axis=0))
-        ratios, drifted = comparison.relative_damages(path["section_force"]).values(), comparison.drift_off_time(path)
+        ratios, drifted = (
+            run_comparison.relative_damages(path["section_force"]).values(),
+            run_comparison.drift_off_time(path),
+        )
         lines.append(
             f"  {name:<18}"
             + "".join(f"{1e3 * v:>9.3g}" for v in largest[:3])
@@ -70,28 +73,28 @@ def _table_lines(scene: HubScene, comparison: StabiliserComparison) -> list[str]
     if not known:
         lines.append("  the true run is not known: angles are beside the filter's estimate, damage beside that run's")
     lines += [f"  doubt: {text}" for text in tilt.objections]
-    lines += [f"  {name}: {text}" for name, text in comparison.failed.items()]
-    if len(comparison.runs) > len(METHOD_OF_RUN):
-        lines.append(f"  engines before drift-off: {comparison.largest_engine_difference():.1e}")
+    lines += [f"  {name}: {text}" for name, text in run_comparison.failed.items()]
+    if len(run_comparison.runs) > len(METHOD_OF_RUN):
+        lines.append(f"  engines before drift-off: {run_comparison.largest_engine_difference():.1e}")
     return lines
 
 
-def save(comparison: StabiliserComparison, folder: Path) -> None:
+def save_measurement_and_runs(run_comparison: StabiliserComparison, output_folder: Path) -> None:
     """Save the measurement as CSV files of a user, all runs as ``runs.nc``, and the motion of the chassis as
     ``runs.csv``."""
-    measurement = comparison.measurement
+    measurement = run_comparison.measurement
     names = [
         (f"{hub}_{name}", next(iter(units)))
         for hub in measurement.vehicle.hubs
         for name, units in COLUMNS_OF_HUB.items()
     ]
-    _write_samples(folder / "hub_forces.csv", names, measurement.forces)
+    _write_samples(output_folder / "hub_forces.csv", names, measurement.forces)
     _write_samples(
-        folder / "angles.csv",
+        output_folder / "angles.csv",
         [(name, next(iter(units))) for name, units in COLUMNS_OF_ANGLES.items()],
         measurement.angles,
     )
-    runs = comparison.results
+    runs = run_comparison.results
     angles, position_names = list(MOTION_CHANNELS)[:3], list(MOTION_CHANNELS)[3:]
     columns = {
         f"{name}: {channel}": (MOTION_CHANNELS[channel][1], path[channel])
@@ -99,14 +102,14 @@ def save(comparison: StabiliserComparison, folder: Path) -> None:
         for name, path in runs.items()
         for channel in channels
     }
-    write_time_series(folder / "runs.csv", columns, float(next(iter(comparison.runs.values())).times[1]))
-    join_results(runs, "run").save(folder / "runs.nc")
+    write_time_series(output_folder / "runs.csv", columns, float(next(iter(run_comparison.runs.values())).times[1]))
+    join_results(runs, "run").save(output_folder / "runs.nc")
 
 
-def _write_samples(path: Path, names: list[tuple[str, str]], sampled: Any) -> None:
+def _write_samples(table_path: Path, columns_and_units: list[tuple[str, str]], sampled: Any) -> None:
     """Write sampled hub forces or angles to a CSV file, with a column for each (name, unit)."""
-    columns = {name: (unit, sampled.samples[:, i]) for i, (name, unit) in enumerate(names)}
-    write_time_series(path, columns, sampled.period)
+    columns = {name: (unit, sampled.samples[:, i]) for i, (name, unit) in enumerate(columns_and_units)}
+    write_time_series(table_path, columns, sampled.period)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from models.systems.wheelset.run import ORBIT_CHANNELS, branch_result, cycle_spe
 from models.systems.wheelset.scene import WheelsetScene
 
 SYSTEM = "wheelset"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 class Options(Strict):
@@ -36,41 +36,43 @@ def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
         raise InputError(scene.file, "speeds", None, "a branch needs a range of speeds: give start and stop")
 
 
-def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: WheelsetScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute the branch of limit cycles over speed, and the cycle at one speed in every engine; saves ``branch`` and
     ``cycle_ENGINE.nc``, and figures; returns the summary.
 
     The branch is a table (CSV) and a result (netCDF).
     """
-    from studies.wheelset_figures import branch_figure, cycle_figure
+    from studies.wheelset_figures import limit_cycle_branch_figure, limit_cycle_figure
 
     options = read(Options, scene.options, scene.file, "options")
     branched = branch_result(
-        scene, lambda count: progress("branch of cycles", 0.6 * count / (count + 10)), estimate_error=scene.error
+        scene, lambda count: report_progress("branch of cycles", 0.6 * count / (count + 10)), estimate_error=scene.error
     )
     orbits, notes = branched.detail, json.loads(branched.data.attrs["doubts"])
     speed = options.speed or cycle_speed(scene, orbits)
-    progress(f"cycle at {speed:g} m/s", 0.6)
+    report_progress(f"cycle at {speed:g} m/s", 0.6)
     results, failed = cycles_of_engines(scene, engines, speed, estimate_error=scene.error)
     by_engine: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
     for engine, result in results.items():
-        result.save(folder / f"cycle_{engine}.nc")
+        result.save(output_folder / f"cycle_{engine}.nc")
     if orbits:
-        branched.save(folder / "branch.nc")
-        branched.save_table(folder / "branch.csv", *ORBIT_CHANNELS)
-        branch_figure(branched, wheelset_of(scene), scene.title, folder / "branch.png")
+        branched.save(output_folder / "branch.nc")
+        branched.save_table(output_folder / "branch.csv", *ORBIT_CHANNELS)
+        limit_cycle_branch_figure(branched, wheelset_of(scene), scene.title, output_folder / "branch.png")
     if by_engine:
-        cycle_figure(results, scene.title, folder / "cycle.png")
+        limit_cycle_figure(results, scene.title, output_folder / "cycle.png")
     else:
         notes.append(f"at {speed:g} m/s a motion from {1e3 * scene.run.displacement:g} mm dies out: no cycle")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": failed,
         "answer": {
-            "branch": [_numbers_of_orbit(orbit, *ORBIT_CHANNELS) for orbit in orbits],
+            "branch": [_quantities_of_cycle(orbit, *ORBIT_CHANNELS) for orbit in orbits],
             "cycles": {
-                engine: _numbers_of_orbit(orbit, *(name for name in ORBIT_CHANNELS if name != "multiplier"))
+                engine: _quantities_of_cycle(orbit, *(name for name in ORBIT_CHANNELS if name != "multiplier"))
                 for engine, orbit in by_engine.items()
             },
         },
@@ -79,20 +81,20 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     }
 
 
-def _numbers_of_orbit(orbit: Orbit, *names: str) -> dict[str, float]:
+def _quantities_of_cycle(orbit: Orbit, *quantity_names: str) -> dict[str, float]:
     """Named quantities of a limit cycle as plain numbers in SI units."""
-    return {name: float(getattr(orbit, name)) for name in names}
+    return {name: float(getattr(orbit, name)) for name in quantity_names}
 
 
-def _branch_lines(orbits: list[Orbit]) -> list[str]:
+def _branch_lines(limit_cycles: list[Orbit]) -> list[str]:
     """Lines for the screen, one for each limit cycle of the branch."""
-    if not orbits:
+    if not limit_cycles:
         return []
     lines = [
         "  cycles, by rising amplitude; the error is what halving the step changes",
         "    amplitude       speed    error   frequency    error  multiplier",
     ]
-    for o in orbits:
+    for o in limit_cycles:
         kind = "attracts" if o.stable else "repels"
         lines.append(
             f"    {1e3 * o.amplitude:>6.3f} mm{o.speed:>8.3f} m/s{o.error:>9.0e}{o.frequency:>9.4f} Hz"
@@ -101,11 +103,11 @@ def _branch_lines(orbits: list[Orbit]) -> list[str]:
     return lines
 
 
-def _cycle_lines(cycles: dict[str, Orbit]) -> list[str]:
+def _cycle_lines(cycles_by_engine: dict[str, Orbit]) -> list[str]:
     """Lines for the screen on amplitude, frequency, forces and power of the limit cycle in every engine."""
-    if not cycles:
+    if not cycles_by_engine:
         return []
-    first = next(iter(cycles.values()))
+    first = next(iter(cycles_by_engine.values()))
     path = first.path()
     power, creep = path.contacts["power"], np.hypot(path.contacts["fx"], path.contacts["fy"])
     yaw = 1e3 * path.states[:, YAW].max()
@@ -114,7 +116,7 @@ def _cycle_lines(cycles: dict[str, Orbit]) -> list[str]:
         f"{creep.max():,.0f} N, their power from {power.min():,.4g} to {power.max():.3g} W at a patch, "
         f"{-np.trapezoid(power.sum(axis=1), path.times):.4g} J in a period"
     ]
-    for engine, o in cycles.items():
+    for engine, o in cycles_by_engine.items():
         lines.append(
             f"    {engine:<10}{1e3 * o.amplitude:>12.8f} mm, error {1e3 * o.error:.0e}"
             f"{o.frequency:>14.9f} Hz, error {o.frequency_error:.0e}"

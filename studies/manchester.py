@@ -23,7 +23,7 @@ from models.systems.wheel_rail.run import (
 from models.systems.wheel_rail.scene import WheelRailScene
 
 SYSTEM = "wheel-rail"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 FLANGE_ANGLE = 0.8
 """Contact angle (rad) above which a patch counts as flange contact."""
 PANEL_TITLES = {
@@ -54,28 +54,30 @@ TABLE_NOTES = [
 ]
 
 
-def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: WheelRailScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute every case at every displacement; saves each as netCDF and as CSV tables of positions and patches, and a
     figure; returns the summary."""
     results, failed, table = dict[str, Result](), dict[str, str](), list[str]()
     for k, (name, case) in enumerate(scene.cases.items()):
         result = results[name] = system.run(
-            scene, case=name, report_progress=partial(_report_progress, progress, scene, k), error=scene.error
+            scene, case=name, report_progress=partial(_report_progress, report_progress, scene, k), error=scene.error
         )
         contacts = result.detail
         failed |= {f"{name}, {shift:g} mm": why for shift, why in contacts.failures.items()}
         text = f"{case_text(case.yaw, case.friction)}; {cost(contacts.seconds)} a position"
         table += [f"  {name}: {text}", *_table_lines(contacts.placements)]
         if contacts.placements:
-            _save_tables(name, result, folder)
+            _save_tables(name, result, output_folder)
     if drawn := {name: result for name, result in results.items() if result.detail.placements}:
-        _figure(scene, drawn, folder / "manchester.png")
+        _figure(scene, drawn, output_folder / "manchester.png")
     answer = {
         name: [position_quantities(placed) for placed in result.detail.placements] for name, result in results.items()
     }
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": failed,
         "answer": answer,
         "results": results,
@@ -84,18 +86,18 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
 
 
 def _report_progress(
-    progress: Progress, scene: WheelRailScene, case_number: int, lateral_shift: float, share: float
+    report_progress: ReportProgress, scene: WheelRailScene, case_number: int, lateral_shift: float, share: float
 ) -> None:
-    progress(f"{[*scene.cases][case_number]} at {lateral_shift:g} mm", (case_number + share) / len(scene.cases))
+    report_progress(f"{[*scene.cases][case_number]} at {lateral_shift:g} mm", (case_number + share) / len(scene.cases))
 
 
-def _save_tables(name: str, result: Result, folder: Path) -> None:
+def _save_tables(case_name: str, case_result: Result, output_folder: Path) -> None:
     """Save the result of a case: netCDF, a CSV table with a row for each position, and one with a row for each patch
     for each wheel."""
-    result.save(folder / f"{name}.nc")
-    result.save_table(folder / f"{name}.csv", *POSITION_UNITS)
+    case_result.save(output_folder / f"{case_name}.nc")
+    case_result.save_table(output_folder / f"{case_name}.csv", *POSITION_UNITS)
     units = {"shift": "mm", "patch": "-", **{key: unit for key, (unit, _, _) in PATCH_QUANTITIES.items()}}
-    positions = [position_quantities(placed) for placed in result.detail.placements]
+    positions = [position_quantities(placed) for placed in case_result.detail.placements]
     for wheel in WHEEL_NAMES:
         rows = [
             {"shift": position["shift"], "patch": k, **patch}
@@ -103,10 +105,10 @@ def _save_tables(name: str, result: Result, folder: Path) -> None:
             for k, patch in enumerate(position[wheel], 1)
         ]
         columns = {key: (unit, np.array([row[key] for row in rows])) for key, unit in units.items()}
-        write_table(folder / f"{name}_{wheel}.csv", columns)
+        write_table(output_folder / f"{case_name}_{wheel}.csv", columns)
 
 
-def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> None:
+def _figure(scene: WheelRailScene, results_by_case: dict[str, Result], figure_path: Path) -> None:
     """Save a figure of the contact patches, with a column of panels per wheel; bars in the first row are patch
     widths."""
     from models.drawing.figures import COLUMN_WIDTH, CURVE_COLOURS, add_heading, legend_below, save, subplots
@@ -114,7 +116,7 @@ def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> No
     drawn, axes = subplots(len(PANEL_TITLES), 2, figsize=(COLUMN_WIDTH, 9.6), sharex=True, sharey="row")
     for column, wheel in enumerate(WHEEL_NAMES[::-1]):
         for axis, (quantity, label) in zip(axes[:, column], PANEL_TITLES.items(), strict=True):
-            for k, (name, result) in enumerate(results.items()):
+            for k, (name, result) in enumerate(results_by_case.items()):
                 case, data = scene.cases[name], result.data.sel(wheel=wheel)
                 # later cases hollow and beside, so that equal ones show
                 shift = np.repeat(data["shift"].values + 0.08 * k, data.sizes["patch"])
@@ -136,8 +138,8 @@ def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> No
         axes[-1, column].set_xlabel("displacement of the wheelset to the right [mm]")
     legend_below(drawn, axes[0, 0], column_count=2)
     title = f"{scene.title}\nEvery patch; bars in the first row are its width"
-    add_heading(drawn, title, results)
-    save(drawn, path)
+    add_heading(drawn, title, results_by_case)
+    save(drawn, figure_path)
 
 
 def _table_lines(placements: list[WheelsetPlacement]) -> list[str]:
@@ -164,13 +166,13 @@ def _table_lines(placements: list[WheelsetPlacement]) -> list[str]:
     return lines
 
 
-def _patch_lines(position: dict[str, Any]) -> Iterator[str]:
+def _patch_lines(position_row: dict[str, Any]) -> Iterator[str]:
     """Yield a line for the screen for each contact patch at a position."""
     for wheel in WHEEL_NAMES:
-        for k, patch in enumerate(position[wheel]):
-            lead = f"{position['shift']:6.2f} {wheel:<5}" if k == 0 else " " * 12
+        for k, patch in enumerate(position_row[wheel]):
+            lead = f"{position_row['shift']:6.2f} {wheel:<5}" if k == 0 else " " * 12
             values = "".join(f"{patch[key]:{form}}" for key, form in PRINTED_COLUMNS.items())
-            end = f"{position['radius_difference']:8.3f}" if k == 0 and wheel == "right" else ""
+            end = f"{position_row['radius_difference']:8.3f}" if k == 0 and wheel == "right" else ""
             yield f"    {lead}{values}{end}"
 
 

@@ -19,10 +19,10 @@ from models.identification.held_out import IdentifiedVehicle, ParameterSearch, i
 from models.identification.of_scene import SceneModel
 from models.systems.single_track.race_file import IDENTIFIED_PARAMETERS, RACE_CAR, write_plain_table
 from models.systems.single_track.scene import SingleTrackScene, build
-from studies.command.identify import identification_lines, identification_record
+from studies.command.identify import identification_as_dict, identification_lines
 
 SYSTEM = "single-track"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 AIMED_ERRORS = {"yaw rate": 0.12, "lateral acceleration": 0.12, "side slip": 0.25}
 """Aim for the rms prediction error of each channel, divided by the rms of the measurement."""
 
@@ -73,28 +73,32 @@ def check(scene: SingleTrackScene, engines: tuple[str, ...]) -> None:
         raise InputError(scene.file, "options.prediction", options.prediction, "needs options.measurement beside it")
 
 
-def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: SingleTrackScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Identify the vehicle, predict its motion, and compare with simpler vehicles; saves ``race_car.png``,
     ``predicted.nc`` and the measured drives, and returns the summary."""
-    from studies.race_car_figure import draw
+    from studies.race_car_figure import draw_race_car_figure
 
     options = read(Options, scene.options, scene.file, "options")
-    first, second = identification_and_test_scenes(scene, options, folder)
+    first, second = identification_and_test_scenes(scene, options, output_folder)
     chosen = identified_vehicle(
         first,
         second,
         ParameterSearch(options.identified_keys(), list(AIMED_ERRORS), options.low_pass, options.blocks),
-        progress,
+        report_progress,
     )
-    simpler = {name: identified_simpler(first, second, options, name, progress) for name in SIMPLER_VEHICLES}
-    draw(chosen, simpler, scene.title, folder / "race_car.png")
+    simpler = {
+        name: identify_simpler_vehicle(first, second, options, name, report_progress) for name in SIMPLER_VEHICLES
+    }
+    draw_race_car_figure(chosen, simpler, scene.title, output_folder / "race_car.png")
     solved = chosen.uncertainty.fit
     predicted = SceneModel(second, [identified_one.name for identified_one in solved.problem.parameters], "").result(
         solved.values
     )
-    predicted.save(folder / "predicted.nc")
+    predicted.save(output_folder / "predicted.nc")
     answer = error_ratios(chosen)
-    answer["identified"] = identification_record(chosen.uncertainty)
+    answer["identified"] = identification_as_dict(chosen.uncertainty)
     answer["simpler vehicles"] = {
         name: dict(zip(AIMED_ERRORS, identified_one.bands.relative_error(), strict=True))
         for name, identified_one in simpler.items()
@@ -102,7 +106,7 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     answer["residuals"] = residual_correlations(chosen)
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "answer": answer,
         "results": {"prediction": predicted},
@@ -115,60 +119,71 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
 
 
 def identification_and_test_scenes(
-    scene: SingleTrackScene, options: Options, folder: Path
+    scene: SingleTrackScene, study_options: Options, output_folder: Path
 ) -> tuple[SingleTrackScene, SingleTrackScene]:
     """Scene of the drive's section for identification, and scene of the section for prediction; measured drives are
-    written into ``folder``."""
-    if not options.measurement:
+    written into ``output_folder``."""
+    if not study_options.measurement:
         full_scene, path = scene, scene.path(scene.drive.file, "drive.file")
     else:
-        path = write_plain_table(_data_file(scene, options.measurement, "options.measurement"), folder / "measured.csv")
+        path = write_plain_table(
+            _data_file(scene, study_options.measurement, "options.measurement"), output_folder / "measured.csv"
+        )
         full_scene = _scene_with_car(scene, path, RACE_CAR)
-    if options.prediction:
+    if study_options.prediction:
         prediction_file = write_plain_table(
-            _data_file(scene, options.prediction, "options.prediction"), folder / "predicted.csv"
+            _data_file(scene, study_options.prediction, "options.prediction"), output_folder / "predicted.csv"
         )
         return full_scene, _scene_with_car(scene, prediction_file, RACE_CAR)
     from models.measured.drive import read_drive
 
     drive_times = read_drive(path).times
-    middle = float(drive_times[round(options.share * len(drive_times))])
+    middle = float(drive_times[round(study_options.share * len(drive_times))])
     ends = [float(drive_times[0]), middle], [middle, float(drive_times[-1])]
     return tuple(_scene_of_section(full_scene, end) for end in ends)  # type: ignore[return-value]
 
 
-def _data_file(scene: SingleTrackScene, name: str, key_path: str) -> Path:
+def _data_file(scene: SingleTrackScene, file_name: str, key_path: str) -> Path:
     """Path of a file in the folder TWINRIG_DATA if it is there; else the path that the scene finds for the name."""
     data = os.environ.get("TWINRIG_DATA", "")
-    return Path(data) / name if data and (Path(data) / name).is_file() else scene.path(name, key_path)
+    return Path(data) / file_name if data and (Path(data) / file_name).is_file() else scene.path(file_name, key_path)
 
 
-def _scene_with_car(scene: SingleTrackScene, path: Path, car: dict[str, Any]) -> SingleTrackScene:
+def _scene_with_car(scene: SingleTrackScene, drive_path: Path, car_tables: dict[str, Any]) -> SingleTrackScene:
     """Scene of a car, given as tables, on the drive in a file."""
-    table = {"title": scene.title, "system": SYSTEM, **car, "drive": {"file": path.name, "low_pass": 10.0}}
-    return build(table, scene.file, path.parent)
+    table = {"title": scene.title, "system": SYSTEM, **car_tables, "drive": {"file": drive_path.name, "low_pass": 10.0}}
+    return build(table, scene.file, drive_path.parent)
 
 
-def _scene_of_section(scene: SingleTrackScene, ends: list[float]) -> SingleTrackScene:
-    return scene.model_copy(update={"drive": scene.drive.model_copy(update={"stretch": ends}), "options": {}})
+def _scene_of_section(scene: SingleTrackScene, section_ends: list[float]) -> SingleTrackScene:
+    return scene.model_copy(update={"drive": scene.drive.model_copy(update={"stretch": section_ends}), "options": {}})
 
 
-def identified_simpler(
-    first_scene: SingleTrackScene, second_scene: SingleTrackScene, options: Options, name: str, progress: Progress
+def identify_simpler_vehicle(
+    identification_scene: SingleTrackScene,
+    prediction_scene: SingleTrackScene,
+    study_options: Options,
+    vehicle_name: str,
+    report_progress: ReportProgress,
 ) -> IdentifiedVehicle:
     """Identification and prediction with a simpler vehicle, of which some parameters are fixed and fewer are
     identified."""
-    holds, kept_words = SIMPLER_VEHICLES[name]
-    parameters = [text for text in options.identified_keys() if any(word in text for word in kept_words)]
-    simpler_search = ParameterSearch(parameters, list(AIMED_ERRORS), options.low_pass, blocks=2)
+    holds, kept_words = SIMPLER_VEHICLES[vehicle_name]
+    parameters = [text for text in study_options.identified_keys() if any(word in text for word in kept_words)]
+    simpler_search = ParameterSearch(parameters, list(AIMED_ERRORS), study_options.low_pass, blocks=2)
 
     def tell(text: str, share: float) -> None:
-        progress(f"{name}: {text}", 0.95)
+        report_progress(f"{vehicle_name}: {text}", 0.95)
 
-    return identified_vehicle(_with_values(first_scene, holds), _with_values(second_scene, holds), simpler_search, tell)
+    return identified_vehicle(
+        _scene_with_values(identification_scene, holds),
+        _scene_with_values(prediction_scene, holds),
+        simpler_search,
+        tell,
+    )
 
 
-def _with_values(scene: SingleTrackScene, new_values: dict[str, float]) -> SingleTrackScene:
+def _scene_with_values(scene: SingleTrackScene, new_values: dict[str, float]) -> SingleTrackScene:
     from models.core.scene_file import set_key
 
     table = scene.table()
@@ -179,15 +194,15 @@ def _with_values(scene: SingleTrackScene, new_values: dict[str, float]) -> Singl
     return build(table, scene.file, Path(scene.folder))
 
 
-def error_ratios(identification: IdentifiedVehicle) -> dict[str, Any]:
+def error_ratios(identified_vehicle: IdentifiedVehicle) -> dict[str, Any]:
     """For each channel, ratios of: rms prediction error to rms of the measurement; samples inside the bands to all
     samples; half-width of the bands to the error; rms cross-validation error to rms of the measurement."""
-    sizes = np.array([channel.size for channel in identification.uncertainty.fit.problem.channels])
-    crossed = np.sqrt(np.mean(identification.cross_validation_errors**2, axis=1)) / sizes
+    sizes = np.array([channel.size for channel in identified_vehicle.uncertainty.fit.problem.channels])
+    crossed = np.sqrt(np.mean(identified_vehicle.cross_validation_errors**2, axis=1)) / sizes
     share_inside, width, relative = (
-        identification.bands.share_inside(),
-        identification.bands.relative_width(),
-        identification.bands.relative_error(),
+        identified_vehicle.bands.share_inside(),
+        identified_vehicle.bands.relative_width(),
+        identified_vehicle.bands.relative_error(),
     )
     return {
         name: {
@@ -200,14 +215,14 @@ def error_ratios(identification: IdentifiedVehicle) -> dict[str, Any]:
     }
 
 
-def _result_lines(full_identification: IdentifiedVehicle, identifications: dict[str, IdentifiedVehicle]) -> list[str]:
+def _result_lines(full_vehicle: IdentifiedVehicle, identified_vehicles: dict[str, IdentifiedVehicle]) -> list[str]:
     table = [f"  {'prediction':<26}{'error':>9}{'aim':>8}{'inside 95 %':>13}{'half-width':>12}{'parts':>9}"]
-    for name, identified_one in error_ratios(full_identification).items():
+    for name, identified_one in error_ratios(full_vehicle).items():
         table.append(
             f"  {name:<26}{identified_one['error']:>9.1%}{AIMED_ERRORS[name]:>8.0%}{identified_one['inside']:>13.1%}"
             f"{identified_one['half-width by error']:>12.2f}{identified_one['error between parts']:>9.1%}"
         )
-    for name, identified_one in identifications.items():
+    for name, identified_one in identified_vehicles.items():
         errors = ", ".join(
             f"{n} {e:.1%}" for n, e in zip(AIMED_ERRORS, identified_one.bands.relative_error(), strict=True)
         )
@@ -215,11 +230,11 @@ def _result_lines(full_identification: IdentifiedVehicle, identifications: dict[
     return table
 
 
-def residual_correlations(identification: IdentifiedVehicle) -> dict[str, dict[str, float]]:
+def residual_correlations(identified_vehicle: IdentifiedVehicle) -> dict[str, dict[str, float]]:
     """For each channel, correlations of the cross-validation error, or of its magnitude, with accelerations, speed and
     braking of the car."""
-    problem = identification.uncertainty.fit.problem
-    model = problem.model.result(identification.uncertainty.fit.values)  # type: ignore[attr-defined]
+    problem = identified_vehicle.uncertainty.fit.problem
+    model = problem.model.result(identified_vehicle.uncertainty.fit.values)  # type: ignore[attr-defined]
     clock = problem.clock.times
     lateral, forward_acceleration = (
         np.interp(clock, model.times, model[n]) for n in ("lateral acceleration", "forward acceleration")
@@ -236,16 +251,18 @@ def residual_correlations(identification: IdentifiedVehicle) -> dict[str, dict[s
     }
     return {
         name: {cause: float(np.corrcoef(transform(row), values)[0, 1]) for cause, (transform, values) in causes.items()}
-        for name, row in zip(AIMED_ERRORS, identification.cross_validation_errors, strict=True)
+        for name, row in zip(AIMED_ERRORS, identified_vehicle.cross_validation_errors, strict=True)
     }
 
 
-def _residual_lines(residuals: dict[str, dict[str, float]]) -> list[str]:
-    def causes_text(causes: dict[str, float]) -> str:
-        strongest = sorted(causes, key=lambda cause: -abs(causes[cause]))[:2]
-        return ", ".join(f"{cause} {causes[cause]:+.2f}" for cause in strongest)
+def _residual_lines(correlations_by_channel: dict[str, dict[str, float]]) -> list[str]:
+    def causes_text(correlations: dict[str, float]) -> str:
+        strongest = sorted(correlations, key=lambda cause: -abs(correlations[cause]))[:2]
+        return ", ".join(f"{cause} {correlations[cause]:+.2f}" for cause in strongest)
 
-    return [f"  residual of {name} goes with: {causes_text(causes)}" for name, causes in residuals.items()]
+    return [
+        f"  residual of {name} goes with: {causes_text(causes)}" for name, causes in correlations_by_channel.items()
+    ]
 
 
 if __name__ == "__main__":

@@ -14,17 +14,20 @@ SECONDS_SHOWN = 60.0
 """Length (s) of the shown part of the prediction."""
 
 
-def draw(
-    full_identification: "IdentifiedVehicle", identifications: dict[str, "IdentifiedVehicle"], title: str, path: Path
+def draw_race_car_figure(
+    full_vehicle: "IdentifiedVehicle",
+    identified_vehicles: dict[str, "IdentifiedVehicle"],
+    title: str,
+    figure_path: Path,
 ) -> Path:
     """Save a figure of the channels over time with their prediction bands, and of the errors of all vehicles; returns
     its path."""
-    problem = full_identification.bands.problem
+    problem = full_vehicle.bands.problem
     clock_times = problem.clock.times
     shown = clock_times <= clock_times[0] + SECONDS_SHOWN
     figure, axes = subplots(len(problem.channels) + 1, 1, figsize=(8.0, 9.6))
     for axis, channel, row, half in zip(
-        axes, problem.channels, full_identification.bands.predicted, full_identification.bands.half_width, strict=False
+        axes, problem.channels, full_vehicle.bands.predicted, full_vehicle.bands.half_width, strict=False
     ):
         low, high = row - half, row + half
         axis.fill_between(
@@ -35,7 +38,7 @@ def draw(
         unit = channel.unit.replace("^2", "²")
         axis.set(title=channel.name.capitalize(), ylabel=f"[{unit}]", xlabel="time [s]")
     names = [channel.name for channel in problem.channels]
-    vehicles = {"chosen": full_identification, **identifications}
+    vehicles = {"chosen": full_vehicle, **identified_vehicles}
     for i, (name, identified_vehicle) in enumerate(vehicles.items()):
         bar_positions = np.arange(len(names)) + 0.25 * i
         axes[-1].bar(
@@ -50,4 +53,4 @@ def draw(
     axes[-1].legend()
     axes[0].legend(ncols=3)
     add_heading(figure, title, {})
-    return save(figure, path)
+    return save(figure, figure_path)

@@ -26,18 +26,18 @@ def check(scene: MeasuredScene, engines: tuple[str, ...]) -> None:
     read(Options, scene.options, scene.file, "options")
 
 
-def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: Any) -> dict[str, Any]:
+def run(scene: MeasuredScene, engines: tuple[str, ...], output_folder: Path, report_progress: Any) -> dict[str, Any]:
     """Check, run and judge the recording; saves the result and the page, the page even if errors in the recording
     prevent the run; returns the summary."""
     from studies.recording_page import write
 
-    result = run_scene(scene, engines[-1], folder, progress, whole_run=True, error=scene.error)
+    result = run_scene(scene, engines[-1], output_folder, report_progress, whole_run=True, error=scene.error)
     exam: RecordingAnalysis = result.detail
-    result.save(folder / "recording.nc")
-    page = write(exam, folder / "recording.html", result)
+    result.save(output_folder / "recording.nc")
+    page = write(exam, output_folder / "recording.html", result)
     return {
         "scene": exam.scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": _failure_reasons(exam),
         "page": str(page),
         "results": {exam.chosen_run: result},
@@ -45,51 +45,55 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
         "effects": [str(consequence) for consequence in exam.consequences],
         "findings": findings_as_dicts(finding for finding in exam.findings if finding.weight != "note"),
         "doubts": sum(finding.weight == "doubt" for finding in exam.findings),
-        "channels": _force_sizes(exam),
+        "channels": _section_force_magnitudes(exam),
         "table": [*_lines_of_findings(exam), f"  the page: {page}"],
     }
 
 
-def _failure_reasons(examination: RecordingAnalysis) -> dict[str, str]:
+def _failure_reasons(examined_recording: RecordingAnalysis) -> dict[str, str]:
     """Reasons for which the command ends with code 1: errors in the recording, or the failure of the run whose results
     were to be saved."""
-    if examination.has_error_findings:
-        count = sum(finding.weight == "error" for finding in examination.findings)
+    if examined_recording.has_error_findings:
+        count = sum(finding.weight == "error" for finding in examined_recording.findings)
         return {"checks": f"{count} error(s) in the recording: nothing was run"}
-    return {name: text for name, text in examination.failed.items() if name == examination.scene.stabilise.method}
+    return {
+        name: text
+        for name, text in examined_recording.failed.items()
+        if name == examined_recording.scene.stabilise.method
+    }
 
 
-def _force_sizes(examination: RecordingAnalysis) -> dict[str, Any]:
+def _section_force_magnitudes(examined_recording: RecordingAnalysis) -> dict[str, Any]:
     """Unit, largest magnitude and rms of each section force, for the summary."""
     sizes = dict[str, Any]()
-    for answer, counted in examination.counted.items():
-        assert examination.outcome is not None
+    for answer, counted in examined_recording.counted.items():
+        assert examined_recording.outcome is not None
         largest = float(np.abs([counted.smallest_load, counted.largest_load]).max())
         sizes[answer.name] = {
             "unit": answer.unit,
             "max": largest,
-            "rms": root_mean_square(examination.outcome.samples(answer)),
+            "rms": root_mean_square(examined_recording.outcome.samples(answer)),
         }
     return sizes
 
 
-def _lines_of_findings(examination: RecordingAnalysis) -> list[str]:
+def _lines_of_findings(examined_recording: RecordingAnalysis) -> list[str]:
     """Lines for the screen: findings above a note, how each run ended, and the verdicts on the runs."""
     lines = [
         f"  {finding.weight}: {finding.text}"
-        for finding in merged_findings(examination.findings)
+        for finding in merged_findings(examined_recording.findings)
         if finding.weight != "note"
     ]
-    notes = sum(finding.weight == "note" for finding in examination.findings)
+    notes = sum(finding.weight == "note" for finding in examined_recording.findings)
     lines.append(f"  {notes} notes say what was looked at and found good, or could not be looked at: see the page")
-    lines += [f"  {subject} of the free run: {trust}" for subject, trust in examination.trust]
-    for name, outcome in examination.runs.items():
-        end = examination.failed.get(name, "to the end")
+    lines += [f"  {subject} of the free run: {trust}" for subject, trust in examined_recording.trust]
+    for name, outcome in examined_recording.runs.items():
+        end = examined_recording.failed.get(name, "to the end")
         lines.append(f"  {name} run: {outcome.period * (outcome.done - 1):.6g} s, {end}")
-    lines += [f"  effect of {text}" for text in consequence_texts(examination.consequences)]
+    lines += [f"  effect of {text}" for text in consequence_texts(examined_recording.consequences)]
     lines += [
         f"  verdict on the {name} run: {verdict.word} ({verdict.reason})"
-        for name, verdict in examination.verdicts.items()
+        for name, verdict in examined_recording.verdicts.items()
     ]
     return lines
 

@@ -26,7 +26,7 @@ from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
 
 SYSTEM = "ride"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 ROADS_BY_KNOWLEDGE = {
     "one track": ("equal", "delayed"),
     "two tracks, axles independent": ("modelled", "uncorrelated"),
@@ -35,7 +35,7 @@ ROADS_BY_KNOWLEDGE = {
 """Road models by name, from the simplest: correlation of left and right, and of front and rear."""
 TIMING_REPEATS = 5
 """Number of interleaved timings of each vehicle."""
-Errors = dict[tuple[str, str], np.ndarray]
+ErrorsByModel = dict[tuple[str, str], np.ndarray]
 """For each (vehicle model, road model), the largest relative error of every output (outputs,)."""
 
 
@@ -58,20 +58,22 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     names = {output.name for output in full.outputs}
     for i, vehicle in enumerate(simpler):
         if not names & {output.name for output in vehicle.outputs}:
-            key_path, name = f"options.simpler.{i}", _options(scene).simpler[i]
+            key_path, name = f"options.simpler.{i}", _study_options(scene).simpler[i]
             raise InputError(scene.file, key_path, name, "has no output of the same name as the scene's vehicle")
 
 
-def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: RideScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compare vehicle and road models with the scene's; saves ``errors.nc`` and ``.csv``, and a figure; returns the
     summary."""
-    from studies.ride_figures import Heading, detail_figure
+    from studies.ride_figures import FigureHeading, model_error_figure
 
     check(scene, engines)
     full, plain = vehicle_of(scene), scene.model_copy(update={"weighting": {}})
     models, results = _vehicles_by_name([*_simpler_vehicles(scene), full]), dict[str, Result]()
     for i, (name, vehicle) in enumerate(models.items()):
-        progress(name, i / len(models))
+        report_progress(name, i / len(models))
         roads = {road: ROADS_BY_KNOWLEDGE[road] for road in _road_names(vehicle)}
         points = SweepPoints(correlations=roads)
         results[name] = run_scene(plain, "reference", vehicle=vehicle, points=points, error=scene.error)
@@ -84,9 +86,9 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         for i, road in enumerate(sweep.cases)
     }
     costs = _computing_times(scene, models)
-    _save_errors(scene, errors, names, results, folder)
+    _save_errors(scene, errors, names, results, output_folder)
     middle = {name: float(np.median(seconds)) for name, seconds in costs.items()}
-    detail_figure(errors, names, middle, Heading(scene.title, results), folder / "detail.png")
+    model_error_figure(errors, names, middle, FigureHeading(scene.title, results), output_folder / "detail.png")
     answer = {
         f"{model}, {road}": {
             name: None if np.isnan(value) else float(value) for name, value in zip(names, values, strict=True)
@@ -95,7 +97,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     }
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "results": results,
         "answer": answer,
@@ -103,22 +105,22 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     }
 
 
-def _options(scene: RideScene) -> Options:
+def _study_options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
 def _simpler_vehicles(scene: RideScene) -> list[SpatialVehicle]:
-    names = enumerate(_options(scene).simpler)
+    names = enumerate(_study_options(scene).simpler)
     return [load_vehicle(name, scene.folder, scene.file, f"options.simpler.{i}") for i, name in names]
 
 
-def _vehicles_by_name(vehicles: list[SpatialVehicle]) -> dict[str, SpatialVehicle]:
+def _vehicles_by_name(simpler_vehicles: list[SpatialVehicle]) -> dict[str, SpatialVehicle]:
     """Vehicles by names such as "7 freedoms"; the file's name is added if several vehicles have the same number of
     freedoms."""
-    counts = [len(vehicle.coordinates()) for vehicle in vehicles]
+    counts = [len(vehicle.coordinates()) for vehicle in simpler_vehicles]
     return {
         f"{n} freedoms" + (f" of {vehicle.name}" if counts.count(n) > 1 else ""): vehicle
-        for n, vehicle in zip(counts, vehicles, strict=True)
+        for n, vehicle in zip(counts, simpler_vehicles, strict=True)
     }
 
 
@@ -145,33 +147,45 @@ def _computing_times(scene: RideScene, vehicle_models: dict[str, SpatialVehicle]
 
 
 def _save_errors(
-    scene: RideScene, errors: Errors, names: list[str], results: Mapping[str, Result], folder: Path
+    scene: RideScene,
+    relative_errors: ErrorsByModel,
+    output_names: list[str],
+    deviation_results: Mapping[str, Result],
+    output_folder: Path,
 ) -> None:
     """Save relative errors: a row per output, a column per vehicle and road model; empty if a vehicle lacks the
     output."""
-    heads = [f"{model}, {road}" for model, road in errors]
+    heads = [f"{model}, {road}" for model, road in relative_errors]
     saved = result(
         scene,
-        {"error": Channel(("output", "model"), np.array([*errors.values()]).T, "1", "relative, largest over speeds")},
-        {"output": Channel("output", names), "model": Channel("model", heads)},
+        {
+            "error": Channel(
+                ("output", "model"), np.array([*relative_errors.values()]).T, "1", "relative, largest over speeds"
+            )
+        },
+        {"output": Channel("output", output_names), "model": Channel("model", heads)},
         engine="reference",
     )
-    derived_result(saved, results, "the deviations of which they are ratios").save(folder / "errors.nc")
+    derived_result(saved, deviation_results, "the deviations of which they are ratios").save(
+        output_folder / "errors.nc"
+    )
     table = saved.data["error"].to_pandas().rename(columns=lambda head: f"{head} [-]")
-    write_whole(folder / "errors.csv", table.to_csv())
+    write_whole(output_folder / "errors.csv", table.to_csv())
 
 
-def _table_lines(errors: Errors, computing_times: dict[str, list[float]], full_vehicle: SpatialVehicle) -> list[str]:
+def _table_lines(
+    relative_errors: ErrorsByModel, computing_times: dict[str, list[float]], full_vehicle: SpatialVehicle
+) -> list[str]:
     """Lines for the screen: the largest error of each vehicle model on each road model, with a column per kind of
     output."""
     kinds = np.array([output.kind for output in full_vehicle.outputs])
     shown = list(dict.fromkeys(kinds.tolist()))
-    width = max(len(f"{model}, {road}") for model, road in errors) + 2
+    width = max(len(f"{model}, {road}") for model, road in relative_errors) + 2
     lines = [
         "  largest error of a standard deviation over all speeds, against the full vehicle on two tracks with delay",
         f"    {'':<{width}}{'cost, median and range':>30}" + "".join(f"{kind:>22}" for kind in shown),
     ]
-    for (model, road), values in errors.items():
+    for (model, road), values in relative_errors.items():
         of_kinds = [values[(kinds == kind) & np.isfinite(values)] for kind in shown]
         worst = [f"{100 * max(of_kind, key=abs):+.1f} %" if len(of_kind) else "-" for of_kind in of_kinds]
         columns = "".join(f"{text:>22}" for text in worst)

@@ -44,11 +44,11 @@ CORRELATION_COLOURS = (DARK, BLUE, SKY, VERMILION, PINK)
 CORRELATION_STYLES = ("-", "--", ":", "--", ":")
 
 
-class Heading(NamedTuple):
+class FigureHeading(NamedTuple):
     """Title of a figure, and the results whose warnings are printed below it."""
 
     title: str
-    results: Results
+    shown_results: Results
 
 
 def body_acceleration_figure(
@@ -57,13 +57,13 @@ def body_acceleration_figure(
     speed_sweep: Sweep,
     vehicle: SpatialVehicle,
     speed: float,
-    heading: Heading,
-    path: Path,
+    heading: FigureHeading,
+    figure_path: Path,
 ) -> None:
     """Save a figure of the standard deviation of the body's vertical acceleration in each case of road correlation:
     along the body at a speed (m/s), and over speed for the output nearest to the middle of the axles."""
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.0))
-    name = _middle_acceleration(vehicle)
+    name = _name_of_middle_acceleration(vehicle)
     for i, case in enumerate(sweep_of_points.cases):
         left.plot(
             point_positions,
@@ -87,10 +87,10 @@ def body_acceleration_figure(
         axis.set(ylabel="standard deviation [m/s²]", ylim=(0, None))
         _note_if_no_finite_curve(axis)
     legend_below(figure, left, column_count=2)
-    _save_figure(figure, heading, ": which correlations of the road matter where", path)
+    _save_figure(figure, heading, ": which correlations of the road matter where", figure_path)
 
 
-def _middle_acceleration(vehicle: SpatialVehicle) -> str:
+def _name_of_middle_acceleration(vehicle: SpatialVehicle) -> str:
     """Name of the vertical acceleration output nearest to the middle of the axles, "" if there is none."""
     middle = (vehicle.axles[0] + vehicle.axles[-1]) / 2
     points = [o for o in vehicle.outputs if o.kind == "acceleration" and getattr(o, "axis", None) == (0.0, 0.0, 1.0)]
@@ -106,8 +106,8 @@ def outputs_figure(
     speed_sweep: Sweep,
     kind_and_unit: Sequence[tuple[str, str]],
     static_loads: Mapping[str, float],
-    heading: Heading,
-    path: Path,
+    heading: FigureHeading,
+    figure_path: Path,
 ) -> None:
     """Save a figure of the outputs' standard deviations over speed on the scene's road, with a panel for each kind and
     unit in ``kind_and_unit``; tyre forces are divided by their ``static_loads`` (N)."""
@@ -134,7 +134,7 @@ def outputs_figure(
         axis.set(xlabel="speed [m/s]", ylabel=axis_label, ylim=(0, None), title=kind.capitalize())
         _note_if_no_finite_curve(axis)
         _legend_under_panel(axis)
-    _save_figure(figure, heading, ": standard deviations over speed", path)
+    _save_figure(figure, heading, ": standard deviations over speed", figure_path)
 
 
 def _note_if_no_finite_curve(axis: Axes) -> None:
@@ -173,7 +173,7 @@ def _distinct_curves(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def spectra_figure(
-    linear_vehicle: LinearVehicle, excitation: Excitation, speed: float, heading: Heading, path: Path
+    linear_vehicle: LinearVehicle, excitation: Excitation, speed: float, heading: FigureHeading, figure_path: Path
 ) -> None:
     """Save a figure of the one-sided spectral densities of accelerations and tyre forces over frequency at a speed
     (m/s); no figure if all are 0."""
@@ -195,11 +195,11 @@ def spectra_figure(
         top = max(values.max() for values in curves.values())
         axis.set_ylim(1e-6 * top, 2 * top)
         _legend_under_panel(axis)
-    _save_figure(figure, heading, f": spectra at {speed:g} m/s", path)
+    _save_figure(figure, heading, f": spectra at {speed:g} m/s", figure_path)
 
 
 def road_figure(
-    road: TwoTrackRoad, half_track: float, fitted_road: FittedRoad | None, heading: Heading, path: Path
+    road: TwoTrackRoad, half_track: float, fitted_road: FittedRoad | None, heading: FigureHeading, figure_path: Path
 ) -> None:
     """Save a figure of the spectrum of the left track and the coherency of both tracks: of the road model, measured if
     ``fitted_road`` is given, and of an isotropic road. half_track : half of the track width (m)."""
@@ -223,25 +223,25 @@ def road_figure(
     left.set(xlabel="wavenumber [rad/m]", ylabel="two-sided density [m³]", title="Spectrum of the left track")
     right.set(xlabel="wavenumber [rad/m]", ylabel="coherency [-]", ylim=(0, 1.05), title="Left and right track")
     legend_below(figure, left, right, column_count=3)
-    _save_figure(figure, heading, ": the road", path)
+    _save_figure(figure, heading, ": the road", figure_path)
 
 
-def detail_figure(
-    errors: Mapping[tuple[str, str], np.ndarray],
-    names: Sequence[str],
+def model_error_figure(
+    relative_errors: Mapping[tuple[str, str], np.ndarray],
+    output_names: Sequence[str],
     computing_times: Mapping[str, float],
-    heading: Heading,
-    path: Path,
+    heading: FigureHeading,
+    figure_path: Path,
 ) -> None:
     """Save a coloured table of the errors of all outputs by vehicle and road model, with the computing time (s) of a
     covariance."""
-    share = 0.66 * COLUMN_WIDTH / len(errors)
+    share = 0.66 * COLUMN_WIDTH / len(relative_errors)
     heads = [
         wrapped_text(f"{model}\n{1e3 * computing_times[model]:.2g} ms\n{road}", share, SMALL_TEXT)
-        for model, road in errors
+        for model, road in relative_errors
     ]
-    values = 100 * np.array(list(errors.values())).T
-    figure, axis = subplots(figsize=(COLUMN_WIDTH, 0.3 * len(names) + 2.2))
+    values = 100 * np.array(list(relative_errors.values())).T
+    figure, axis = subplots(figsize=(COLUMN_WIDTH, 0.3 * len(output_names) + 2.2))
     picture = axis.imshow(values, cmap="RdBu_r", vmin=-60, vmax=60, aspect="auto")
     for i, j in np.ndindex(values.shape):
         if np.isfinite(values[i, j]):
@@ -256,11 +256,11 @@ def detail_figure(
                 color="w" if dark else "k",
             )
     axis.set_xticks(range(len(heads)), heads, fontsize=SMALL_TEXT)
-    axis.set_yticks(range(len(names)), names)
+    axis.set_yticks(range(len(output_names)), output_names)
     axis.grid(visible=False)
     figure.colorbar(picture, label="error [%]", extend="both")
     what_is_shown = "largest error of each standard deviation [%], and the time of one covariance"
-    _save_figure(figure, heading, f"\n{what_is_shown.capitalize()}", path)
+    _save_figure(figure, heading, f"\n{what_is_shown.capitalize()}", figure_path)
 
 
 def _signed_text(percent: float) -> str:
@@ -270,11 +270,11 @@ def _signed_text(percent: float) -> str:
 
 def drive_figure(
     varying_speed: VaryingSpeed,
-    quasi_stationary: np.ndarray,
+    steady_deviations: np.ndarray,
     drawn_outputs: Sequence[str],
     kind_and_unit: Mapping[str, tuple[str, str]],
-    heading: Heading,
-    path: Path,
+    heading: FigureHeading,
+    figure_path: Path,
 ) -> None:
     """Save a figure of the standard deviations along a drive (dashed: quasi-stationary), with the speed below them."""
     groups = list(dict.fromkeys(kind_and_unit[name] for name in drawn_outputs))
@@ -287,7 +287,8 @@ def drive_figure(
             name: varying_speed.names.index(name) for name in drawn_outputs if kind_and_unit[name] == (kind, unit)
         }
         pairs = {
-            name: np.concatenate([varying_speed.deviation[:, i], quasi_stationary[:, i]]) for name, i in columns.items()
+            name: np.concatenate([varying_speed.deviation[:, i], steady_deviations[:, i]])
+            for name, i in columns.items()
         }
         for label, both_curves in _distinct_curves(pairs).items():
             exact, quasi = np.split(both_curves, 2)
@@ -300,41 +301,41 @@ def drive_figure(
         _legend_under_panel(axis, 0.03)
     axes[-1, 0].plot(varying_speed.time, varying_speed.speed, color="0.3")
     axes[-1, 0].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
-    _save_figure(figure, heading, "\nSolid: exact; dashed: each speed taken by itself", path)
+    _save_figure(figure, heading, "\nSolid: exact; dashed: each speed taken by itself", figure_path)
 
 
-MOST_OUTPUTS = 12
+DRAWN_OUTPUT_LIMIT = 12
 """Largest number of outputs in a figure."""
 
 
-def nonlinear_figure(nonlinear: NonlinearRide, heading: Heading, path: Path) -> None:
+def nonlinear_figure(nonlinear_sweep: NonlinearRide, heading: FigureHeading, figure_path: Path) -> None:
     """Save a figure of each output's standard deviation over speed by small motion, statistical linearisation and Monte
     Carlo copies; open marks show where statistical linearisation states a large error."""
-    outputs = nonlinear.shown.vehicle.outputs
-    figure, axes = _few_panels(min(len(outputs), MOST_OUTPUTS))
-    left = nonlinear.quantity_by_speed("left_out")
+    outputs = nonlinear_sweep.shown.vehicle.outputs
+    figure, axes = _figure_with_few_panels(min(len(outputs), DRAWN_OUTPUT_LIMIT))
+    left = nonlinear_sweep.quantity_by_speed("left_out")
     for i, (axis, output) in enumerate(zip(axes, outputs, strict=False)):
         unit, factor = _shown_unit(output.unit)
         axis.plot(
-            nonlinear.speeds,
-            factor * nonlinear.small_motion[:, i],
+            nonlinear_sweep.speeds,
+            factor * nonlinear_sweep.small_motion[:, i],
             "--",
             color=GREY,
             label="slopes at rest (small motion)",
         )
-        curve_label = "statistical linearisation" + (", tyres on the road" if nonlinear.tyres_may_lift else "")
-        deviation, poor = factor * nonlinear.deviation[:, i], left[:, i] > ERROR_GRADES[-1][0]
-        axis.plot(nonlinear.speeds, deviation, color=CORRELATION_COLOURS[1], label=curve_label)
+        curve_label = "statistical linearisation" + (", tyres on the road" if nonlinear_sweep.tyres_may_lift else "")
+        deviation, poor = factor * nonlinear_sweep.deviation[:, i], left[:, i] > ERROR_GRADES[-1][0]
+        axis.plot(nonlinear_sweep.speeds, deviation, color=CORRELATION_COLOURS[1], label=curve_label)
         curve_label = "no longer good by its own measure"
         axis.plot(
-            nonlinear.speeds[poor],
+            nonlinear_sweep.speeds[poor],
             deviation[poor],
             "o",
             color=CORRELATION_COLOURS[1],
             fillstyle="none",
             label=curve_label,
         )
-        for j, (speed, copies) in enumerate(nonlinear.copies.items()):
+        for j, (speed, copies) in enumerate(nonlinear_sweep.copies.items()):
             spread = copies.error[i] / copies.deviation[i]  # two standard errors of the deviation
             axis.errorbar(
                 [speed],
@@ -346,32 +347,34 @@ def nonlinear_figure(nonlinear: NonlinearRide, heading: Heading, path: Path) -> 
                 capsize=3,
                 label=""
                 if j
-                else "Monte Carlo, 2 standard errors" + (", tyres lift" if nonlinear.tyres_may_lift else ""),
+                else "Monte Carlo, 2 standard errors" + (", tyres lift" if nonlinear_sweep.tyres_may_lift else ""),
             )
         axis.set(
             xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=output.name.capitalize()
         )
     legend_below(figure, *axes, column_count=2)
-    _save_figure(figure, heading, "\nStandard deviations over speed", path)
+    _save_figure(figure, heading, "\nStandard deviations over speed", figure_path)
 
 
 def engine_spectra_figure(
-    runs: Mapping[str, EngineRide],
+    runs_by_engine: Mapping[str, EngineRide],
     linear_vehicle: LinearVehicle,
-    road: Excitation,
+    road_excitation: Excitation,
     speed: float,
-    heading: Heading,
-    path: Path,
+    heading: FigureHeading,
+    figure_path: Path,
 ) -> None:
     """Save a figure of the spectra of the engines' runs, by Welch's method, and of the statistically linearised
     vehicle."""
     frequency = np.geomspace(0.3, 40.0, 300)
-    expected = one_sided_densities(linear_vehicle, road, speed, frequency)
-    first = next(iter(runs.values()))
-    shown = [i for i in range(len(linear_vehicle.outputs)) if np.isfinite(first.outputs[:, i]).all()][:MOST_OUTPUTS]
-    figure, axes = _few_panels(len(shown))
+    expected = one_sided_densities(linear_vehicle, road_excitation, speed, frequency)
+    first = next(iter(runs_by_engine.values()))
+    shown = [i for i in range(len(linear_vehicle.outputs)) if np.isfinite(first.outputs[:, i]).all()][
+        :DRAWN_OUTPUT_LIMIT
+    ]
+    figure, axes = _figure_with_few_panels(len(shown))
     for axis, i in zip(axes, shown, strict=True):
-        for (engine, run), (line, width) in zip(runs.items(), (("-", 2.2), ("--", 1.0)), strict=False):
+        for (engine, run), (line, width) in zip(runs_by_engine.items(), (("-", 2.2), ("--", 1.0)), strict=False):
             f, density = run.densities(frequency[-1])
             label = f"{LABELS[engine]}, nonlinear in time"
             axis.loglog(f, density[:, i], line, linewidth=width, color=ENGINES[engine], label=label)
@@ -380,21 +383,21 @@ def engine_spectra_figure(
         unit = f"one-sided density [{_squared_unit(output.unit)}/Hz]"
         axis.set(xlabel="frequency [Hz]", ylabel=unit, title=output.name.capitalize(), ylim=(1e-5 * top, 5 * top))
     legend_below(figure, axes[0], column_count=3)
-    _save_figure(figure, heading, f"\nSpectra at {speed:g} m/s", path)
+    _save_figure(figure, heading, f"\nSpectra at {speed:g} m/s", figure_path)
 
 
-def _few_panels(panel_count: int) -> tuple[Figure, list[Axes]]:
+def _figure_with_few_panels(panel_count: int) -> tuple[Figure, list[Axes]]:
     """Figure and axes of small panels, two or three side by side."""
     figure, axes = panels(panel_count, 2 if panel_count in (1, 2, 4) else 3, 2.6)
     figure.set_figheight(figure.get_figheight() + 0.8)  # for title and legend
     return figure, axes
 
 
-def _legend_under_panel(axis: Axes, drop: float = 0.18) -> None:
-    """Put the legend below a panel, ``drop`` times the panel's height lower to leave room for the axis label."""
-    axis.legend(fontsize=SMALL_TEXT, loc="upper center", bbox_to_anchor=(0.5, -drop), ncols=2)
+def _legend_under_panel(axis: Axes, relative_drop: float = 0.18) -> None:
+    """Put the legend below a panel, ``relative_drop`` times the panel's height lower to leave room for the label."""
+    axis.legend(fontsize=SMALL_TEXT, loc="upper center", bbox_to_anchor=(0.5, -relative_drop), ncols=2)
 
 
-def _save_figure(figure: Figure, plot_heading: Heading, text: str, path: Path) -> None:
-    add_heading(figure, plot_heading.title + text, plot_heading.results)
-    save(figure, path)
+def _save_figure(figure: Figure, heading: FigureHeading, title_ending: str, figure_path: Path) -> None:
+    add_heading(figure, heading.title + title_ending, heading.shown_results)
+    save(figure, figure_path)

@@ -23,7 +23,7 @@ from models.vehicles.spatial import SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import preloads, wheels
 
 SYSTEM = "ride"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 class Options(RunSampling):
@@ -41,7 +41,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
     for name, weighting_name in scene.weighting.items():
         raise InputError(scene.file, f"weighting.{name}", weighting_name, "is not read by this study: leave it out")
     check_rates(vehicle, excitation_of(scene, wheels(vehicle)), scene.file)
-    options = _options(scene)
+    options = _study_options(scene)
     for i, speed in enumerate(options.beside):
         if not speed > 0.0:
             raise InputError(scene.file, f"options.beside.{i}", speed, "must be above 0, in m/s")
@@ -50,78 +50,84 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
         raise InputError(scene.file, "options.skipped", options.skipped, allowed)
 
 
-def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: RideScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute standard deviations over speed by statistical linearisation, Monte Carlo copies and engines' runs; saves
     ``nonlinear.nc`` and two figures, and returns the summary."""
-    from studies.ride_figures import Heading, engine_spectra_figure, nonlinear_figure
+    from studies.ride_figures import FigureHeading, engine_spectra_figure, nonlinear_figure
 
     check(scene, engines)
     assert scene.speeds is not None
-    options, vehicle = _options(scene), vehicle_of(scene)
+    options, vehicle = _study_options(scene), vehicle_of(scene)
     speed, road = options.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
-    results = {"reference": run_scene(scene, "reference", sampling=options, progress=progress, error=scene.error)}
-    results["reference"].save(folder / "nonlinear.nc")
+    results = {
+        "reference": run_scene(scene, "reference", sampling=options, report_progress=report_progress, error=scene.error)
+    }
+    results["reference"].save(output_folder / "nonlinear.nc")
     answer, runs, failed = results["reference"].detail, dict[str, EngineRide](), dict[str, str]()
     for engine in (engine for engine in engines if engine in INTEGRATORS):
-        progress(f"{engine} in time", 0.8)
+        report_progress(f"{engine} in time", 0.8)
         try:
             results[engine] = run_scene(scene, engine, sampling=options, error=scene.error)
         except RunFailed as error:
             failed[engine] = str(error)
             continue
         runs[engine] = results[engine].detail
-    top = Heading(scene.title, results)
-    nonlinear_figure(answer, top, folder / "deviations.png")
+    top = FigureHeading(scene.title, results)
+    nonlinear_figure(answer, top, output_folder / "deviations.png")
     if runs:
-        engine_spectra_figure(runs, answer.shown.vehicle, road, speed, top, folder / "spectra.png")
+        engine_spectra_figure(runs, answer.shown.vehicle, road, speed, top, output_folder / "spectra.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": failed,
         "results": results,
         "answer": _summary_of_deviations(answer),
         "table": _table_lines(answer, speed)
         + _lift_off_shares(vehicle, answer, runs)
-        + _time_table(runs, answer, road, speed),
+        + _engine_run_lines(runs, answer, road, speed),
     }
 
 
-def _options(scene: RideScene) -> Options:
+def _study_options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
-def _summary_of_deviations(nonlinear: NonlinearRide) -> dict[str, Any]:
+def _summary_of_deviations(nonlinear_sweep: NonlinearRide) -> dict[str, Any]:
     """Summary: standard deviation and mean (SI) of each output at all speeds, None for values that are not finite; for
     tyres that may lift off, those of the Monte Carlo copies at the copies' speeds."""
-    copies = list(nonlinear.copies.values())
-    table: dict[str, Any] = {"speed": list(nonlinear.copies) if nonlinear.tyres_may_lift else nonlinear.speeds.tolist()}
-    for key, on_road in (("deviation", nonlinear.deviation), ("mean", nonlinear.quantity_by_speed("mean"))):
+    copies = list(nonlinear_sweep.copies.values())
+    table: dict[str, Any] = {
+        "speed": list(nonlinear_sweep.copies) if nonlinear_sweep.tyres_may_lift else nonlinear_sweep.speeds.tolist()
+    }
+    for key, on_road in (("deviation", nonlinear_sweep.deviation), ("mean", nonlinear_sweep.quantity_by_speed("mean"))):
         values = (
             np.array([getattr(copies_at_speed, key) for copies_at_speed in copies])
-            if nonlinear.tyres_may_lift
+            if nonlinear_sweep.tyres_may_lift
             else on_road
         )
         table[key] = {
             name: [float(value) if np.isfinite(value) else None for value in values[:, i]]
-            for i, name in enumerate(nonlinear.shown.covariance.names)
+            for i, name in enumerate(nonlinear_sweep.shown.covariance.names)
         }
     return table
 
 
-def _table_lines(nonlinear: NonlinearRide, speed: float) -> list[str]:
+def _table_lines(nonlinear_sweep: NonlinearRide, speed: float) -> list[str]:
     """Lines for the screen: the springs' equivalent gains at a speed (m/s), and the Monte Carlo copies with the errors
     of both linear vehicles relative to them."""
-    lines, shown = [f"  at {speed:g} m/s"], nonlinear.shown
+    lines, shown = [f"  at {speed:g} m/s"], nonlinear_sweep.shown
     for name, spring in shown.springs.items():
         k, c = spring.equivalent_gains
         lines.append(
             f"    {name}: {k:.5g} N/m and {c:.5g} N s/m stand for it; its travel has the mean "
             f"{1e3 * spring.travel:+.2f} mm and the deviation {1e3 * spring.deviation:.3g} mm"
         )
-    if not nonlinear.tyres_may_lift:
+    if not nonlinear_sweep.tyres_may_lift:
         lines += [f"    {sentence}" for sentence in shown.sentences]
     lines.append(f"    gains found in {len(shown.gain_changes)} iterations, to {shown.fixed_point_distance:.0e}")
-    for speed_of_copies, copies in nonlinear.copies.items():
+    for speed_of_copies, copies in nonlinear_sweep.copies.items():
         lines.append(
             f"  at {speed_of_copies:g} m/s beside {len(copies.moments[0])} copies of {copies.duration:.0f} s: "
             "deviations and means, kurtosis (3 if Gaussian)"
@@ -130,25 +136,29 @@ def _table_lines(nonlinear: NonlinearRide, speed: float) -> list[str]:
         for i, name in enumerate(copies.names):
             deviation = f"{copies.deviation[i]:>10.4g} ± {50 * copies.error[i] / copies.variance[i]:.1f} %"
             mean = f"mean {copies.mean[i]:+.3g} ± {copies.mean_error[i]:.1g}, {copies.kurtosis[i]:.1f}"
-            lines.append(f"    {name:<{width}}{deviation}{_errors_at_speed(nonlinear, speed_of_copies, i)}   {mean}")
+            lines.append(
+                f"    {name:<{width}}{deviation}{_errors_at_speed(nonlinear_sweep, speed_of_copies, i)}   {mean}"
+            )
     return lines
 
 
-def _errors_at_speed(nonlinear: NonlinearRide, speed: float, output_number: int) -> str:
+def _errors_at_speed(nonlinear_sweep: NonlinearRide, speed: float, output_number: int) -> str:
     """Text on the errors of small motion and of statistical linearisation of an output at a speed (m/s); ""
     if the sweep does not have the speed."""
-    matching = np.flatnonzero(np.isclose(nonlinear.speeds, speed))
+    matching = np.flatnonzero(np.isclose(nonlinear_sweep.speeds, speed))
     if not len(matching):
         return ""
-    true = nonlinear.copies[speed].deviation[output_number]
+    true = nonlinear_sweep.copies[speed].deviation[output_number]
     small, replaced = (
         100 * (values[matching[0], output_number] / true - 1)
-        for values in (nonlinear.small_motion, nonlinear.deviation)
+        for values in (nonlinear_sweep.small_motion, nonlinear_sweep.deviation)
     )
     return f"   small motion {small:+.1f} %, statistical linearisation {replaced:+.1f} %"
 
 
-def _lift_off_shares(vehicle: SpatialVehicle, nonlinear: NonlinearRide, runs: dict[str, EngineRide]) -> list[str]:
+def _lift_off_shares(
+    vehicle: SpatialVehicle, nonlinear_sweep: NonlinearRide, runs_by_engine: dict[str, EngineRide]
+) -> list[str]:
     """Lines for the screen on two shares of time for each tyre: for which a tyre that cannot lift off would pull, by a
     Gaussian law, and for which it is in the air in the engines' runs. Empty if no tyre may lift off."""
     from scipy.special import ndtr
@@ -157,8 +167,8 @@ def _lift_off_shares(vehicle: SpatialVehicle, nonlinear: NonlinearRide, runs: di
         return []
     loads, names, largest_deviations = (
         preloads(vehicle).tyres,
-        nonlinear.shown.covariance.names,
-        nonlinear.deviation.max(axis=0),
+        nonlinear_sweep.shown.covariance.names,
+        nonlinear_sweep.deviation.max(axis=0),
     )
     lines = [
         "  tyres lift in copies and engines; small motion and statistical linearisation keep them on the road and "
@@ -167,7 +177,7 @@ def _lift_off_shares(vehicle: SpatialVehicle, nonlinear: NonlinearRide, runs: di
     for spec in (spec for spec in vehicle.outputs if isinstance(spec, TyreOutput) and spec.kind == "tyre force"):
         shares = [
             f"{engine} {100 * np.mean(run.output_values(spec.name) <= -loads[spec.tyre]):.2g} %"
-            for engine, run in runs.items()
+            for engine, run in runs_by_engine.items()
         ]
         pulls = float(ndtr(-loads[spec.tyre] / largest_deviations[names.index(spec.name)]))
         air_text = f"; in the air {', '.join(shares)}" if shares else ""
@@ -178,16 +188,18 @@ def _lift_off_shares(vehicle: SpatialVehicle, nonlinear: NonlinearRide, runs: di
     return lines
 
 
-def _time_table(runs: dict[str, EngineRide], nonlinear: NonlinearRide, road: Excitation, speed: float) -> list[str]:
+def _engine_run_lines(
+    runs_by_engine: dict[str, EngineRide], nonlinear_sweep: NonlinearRide, road_excitation: Excitation, speed: float
+) -> list[str]:
     """Lines for the screen: the engines' standard deviations beside statistical linearisation, and the difference
     between the engines."""
-    if not runs:
+    if not runs_by_engine:
         return []
-    shown, (first, *other_runs) = nonlinear.shown, runs.items()
+    shown, (first, *other_runs) = nonlinear_sweep.shown, runs_by_engine.items()
     length = float(first[1].times[-1])
-    errors = standard_errors(shown.vehicle, road, speed, length)[1] / shown.covariance.variance / 2
+    errors = standard_errors(shown.vehicle, road_excitation, speed, length)[1] / shown.covariance.variance / 2
     lines = [f"  in time at {speed:g} m/s, {length:.3g} s of one road: deviation, beside statistical linearisation"]
-    for engine, run in runs.items():
+    for engine, run in runs_by_engine.items():
         for i, name in enumerate(run.names):
             value = run.outputs[:, i].std()
             if np.isfinite(value):

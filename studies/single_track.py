@@ -13,18 +13,20 @@ from models.systems.single_track.run import run as run_scene
 from models.systems.single_track.scene import SingleTrackScene
 
 SYSTEM = "single-track"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 SHOWN_CHANNELS = {"yaw rate": "rad/s", "lateral acceleration": "m/s²", "side slip": "rad"}
 PANEL_TITLES = {"wheels steer": "Steer angle of the wheels"}
 """Titles of panels for channels whose names are no titles."""
 
 
-def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: SingleTrackScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Run the car along the drive; saves ``drive.nc`` and ``drive.png``, and returns the summary."""
-    progress("the drive", 0.0)
+    report_progress("the drive", 0.0)
     driven = run_scene(scene, error=scene.error)
-    driven.save(folder / "drive.nc")
-    figure(driven, measured_channels(scene, driven), scene.title, folder / "drive.png")
+    driven.save(output_folder / "drive.nc")
+    drive_figure(driven, measured_channels(scene, driven), scene.title, output_folder / "drive.png")
     answer = {
         f"rms of {name} [{unit}]": float(np.sqrt(np.mean(driven[name] ** 2))) for name, unit in SHOWN_CHANNELS.items()
     }
@@ -33,7 +35,7 @@ def run(scene: SingleTrackScene, engines: tuple[str, ...], folder: Path, progres
     }
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "answer": answer,
         "results": {"drive": driven},
@@ -53,7 +55,9 @@ def measured_channels(scene: SingleTrackScene, computed_drive: Result) -> dict[s
     return {name: np.interp(computed_drive.times, *time_and_values) for name, time_and_values in curves.items()}
 
 
-def figure(computed_drive: Result, measured_values: Mapping[str, np.ndarray], title: str, path: Path) -> Path:
+def drive_figure(
+    computed_drive: Result, measured_values: Mapping[str, np.ndarray], title: str, figure_path: Path
+) -> Path:
     """Save a figure of the steer angle and three channels over time, of each axle's slip angle over time, and of its
     ratio of side force to load over slip angle.
 
@@ -79,7 +83,7 @@ def figure(computed_drive: Result, measured_values: Mapping[str, np.ndarray], ti
     axes[4].legend(markerscale=3.0)
     legend_below(drawing, *axes[:4])
     add_heading(drawing, title, {"drive": computed_drive})
-    return save(drawing, path)
+    return save(drawing, figure_path)
 
 
 if __name__ == "__main__":

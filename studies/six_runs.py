@@ -24,41 +24,41 @@ from models.systems.pitch_plane.six_runs import (
     options_of,
 )
 
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 SAVED_SPACING = 0.01
 """Row spacing (s) of the saved runs; the table is computed from every step."""
 check = options_of
 
 
-def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress) -> dict[str, Any]:
     """Run all six runs in each engine; saves every result, five figures and ``table.txt``, and returns the summary."""
     options = check(scene, engines)
-    measured, deviation, scenes = measurement_and_runs(scene, folder, scene.error)
-    measured.save(folder / "measurement.nc")
+    measured, deviation, scenes = measurement_and_runs(scene, output_folder, scene.error)
+    measured.save(output_folder / "measurement.nc")
     runs: dict[str, dict[str, Result]] = {engine: {} for engine in engines}
     failed: dict[str, str] = {}
     pairs = [(engine, name) for engine in engines for name in scenes]
     for i, (engine, name) in enumerate(pairs):
-        progress(f"{engine}: {name}", i / len(pairs))
+        report_progress(f"{engine}: {name}", i / len(pairs))
         try:
             runs[engine][name] = run_with_drift(scenes[name], engine, scene.error)
         except RunFailed as failure:
             failed[f"{engine}, {name}"] = str(failure)
             continue
-        runs[engine][name].every(SAVED_SPACING).save(folder / f"{engine} {name}.nc")
+        runs[engine][name].every(SAVED_SPACING).save(output_folder / f"{engine} {name}.nc")
     rows = [
         figures_of_run(engine, name, measured, result) for engine in engines for name, result in runs[engine].items()
     ]
     table = summary_lines(rows, engines, options, deviation)
-    write_whole(folder / "table.txt", "\n".join(table) + "\n")
-    progress("figures", 1.0)
+    write_whole(output_folder / "table.txt", "\n".join(table) + "\n")
+    report_progress("figures", 1.0)
     if not failed:
-        _draw_figures(measured, runs[engines[0]], folder)
+        _draw_figures(measured, runs[engines[0]], output_folder)
     results_by_name = {f"{engine}: {name}": result for engine in engines for name, result in runs[engine].items()}
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "results": {"measurement": measured, **results_by_name},
         "sampling rate": options.sampling_rate,
         "noise deviation": deviation,
@@ -80,11 +80,11 @@ the moment."""
 
 
 def summary_lines(
-    rows: list[dict[str, Any]], engines: tuple[str, ...], options: SixRunOptions, deviation: float
+    run_rows: list[dict[str, Any]], engines: tuple[str, ...], study_options: SixRunOptions, noise_deviation: float
 ) -> list[str]:
     """Lines for the screen: a table with a line per run and a column per engine."""
     runs: dict[str, list[dict[str, Any]]] = {}
-    for line in rows:
+    for line in run_rows:
         runs.setdefault(line["run"], []).append(line)
     free, guided = list[str](), list[str]()
     for name, lines in runs.items():
@@ -98,7 +98,7 @@ def summary_lines(
         (guided if "moment max" in first else free).append(f"  {name:<20} {cells}   {further_cells}   {paper}".rstrip())
     names = " ".join(f"{engine:>9}" for engine in engines)
     return [
-        f"  Sampled at {options.sampling_rate:g} Hz, linear in between; noise {deviation:.1f} N.",
+        f"  Sampled at {study_options.sampling_rate:g} Hz, linear in between; noise {noise_deviation:.1f} N.",
         f"  Time [s] until the pitch is {DRIFT_OFF_PITCH} rad wrong",
         f"  {'force-excited':<20} {names}   heave [m]   paper",
         *free,
@@ -110,33 +110,33 @@ def summary_lines(
     ]
 
 
-def _draw_figures(measured_run: Result, runs: dict[str, Result], folder: Path) -> None:
+def _draw_figures(measured_run: Result, runs_by_name: dict[str, Result], output_folder: Path) -> None:
     """Save figures like Figs 4 to 8 of the paper."""
     from models.drawing.figures import save
 
-    save(_figure_measurement(measured_run), folder / "fig4_measurement.png")
+    save(_measurement_figure(measured_run), output_folder / "fig4_measurement.png")
     main = {
         "virtual measurement": measured_run,
-        "undisturbed": runs["undisturbed"],
-        "noisy": runs["noisy 1"],
-        "perturbed model": runs["perturbed"],
-        "both": runs["both"],
+        "undisturbed": runs_by_name["undisturbed"],
+        "noisy": runs_by_name["noisy 1"],
+        "perturbed model": runs_by_name["perturbed"],
+        "both": runs_by_name["both"],
     }
-    save(_figure_drift(main, "Force-excited runs beside the measurement"), folder / "fig5_drift.png")
+    save(_drift_figure(main, "Force-excited runs beside the measurement"), output_folder / "fig5_drift.png")
     for prefix, title, name in (
         ("noisy", "noise samples", "fig6_noise_samples"),
         ("model", "perturbed models", "fig7_perturbed_models"),
     ):
         chosen = {"virtual measurement": measured_run} | {
-            key: run for key, run in runs.items() if key.startswith(prefix)
+            key: run for key, run in runs_by_name.items() if key.startswith(prefix)
         }
         if len(chosen) == 1:
             continue
-        save(_figure_drift(chosen, f"Force-excited runs: {len(chosen) - 1} {title}"), folder / f"{name}.png")
-    save(_figure_moment(runs["guided, both"]), folder / "fig8_enforced_moment.png")
+        save(_drift_figure(chosen, f"Force-excited runs: {len(chosen) - 1} {title}"), output_folder / f"{name}.png")
+    save(_moment_figure(runs_by_name["guided, both"]), output_folder / "fig8_enforced_moment.png")
 
 
-def _figure_measurement(measured_run: Result) -> Any:
+def _measurement_figure(measured_run: Result) -> Any:
     from models.drawing.figures import COLUMN_WIDTH, add_heading, legend_below, subplots
 
     figure, axes = subplots(2, 2, figsize=(COLUMN_WIDTH, 4.6), sharex="col", width_ratios=(2, 1))
@@ -156,13 +156,13 @@ def _figure_measurement(measured_run: Result) -> Any:
     return figure
 
 
-def _figure_drift(results: dict[str, Result], title: str) -> Any:
+def _drift_figure(results_by_run: dict[str, Result], title: str) -> Any:
     """Figure of each run's heave error on a logarithmic scale, and of its pitch; the first of the results is the
     measurement."""
     from models.drawing.figures import COLUMN_WIDTH, TRUTH_COLOUR, add_heading, legend_below, subplots
 
     figure, (heave, pitch) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.8))
-    (name, measured), *runs = results.items()
+    (name, measured), *runs = results_by_run.items()
     pitch.plot(measured.times, measured["pitch"], label=name, color=TRUTH_COLOUR, linewidth=1.8, zorder=9)
     for i, (name, run) in enumerate(runs):
         heave.semilogy(run.times, np.abs(channel_error(measured, run, "z3")) + 1e-12, color=f"C{i}", linewidth=0.8)
@@ -170,20 +170,20 @@ def _figure_drift(results: dict[str, Result], title: str) -> Any:
     heave.set(title="Error of the chassis' heave [m]", ylim=(1e-9, 10), xlabel="time [s]")
     pitch.set(title="Pitch, nose up [rad]", ylim=(-1, 1), xlabel="time [s]")
     legend_below(figure, pitch, column_count=6)
-    add_heading(figure, title, results)
+    add_heading(figure, title, results_by_run)
     return figure
 
 
-def _figure_moment(result: Result) -> Any:
+def _moment_figure(stabilised_run: Result) -> Any:
     from models.drawing.figures import COLUMN_WIDTH, add_heading, subplots
 
     figure, (inertia, moment) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.2))
-    inertia.plot(result.times, result["inertia_term"] / 1e3, linewidth=0.5)
+    inertia.plot(stabilised_run.times, stabilised_run["inertia_term"] / 1e3, linewidth=0.5)
     inertia.set(title="Inertia term I β'' [kN m]", xlabel="time [s]")
-    moment.plot(result.times, result["enforced_moment"], linewidth=0.5)
+    moment.plot(stabilised_run.times, stabilised_run["enforced_moment"], linewidth=0.5)
     moment.set(title="Enforced moment [N m]", xlabel="time [s]")
     title = "Pitch prescribed, perturbed model and noisy forces: what the guidance takes"
-    add_heading(figure, title, {"guided, both": result})
+    add_heading(figure, title, {"guided, both": stabilised_run})
     return figure
 
 

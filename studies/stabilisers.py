@@ -24,37 +24,37 @@ from models.systems.pitch_plane.stabilised import (
     options_of,
 )
 
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 check = options_of
 
 
-def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress) -> dict[str, Any]:
     """Run all methods on both roads; saves every road's files, ``score.csv``, ``score.nc``, ``table.txt`` and two
     figures, and returns the summary."""
     from models.drawing.drift import decision_figure, stiffness_figure
     from models.drawing.figures import save
 
-    benches_of_roads, rows, failed = compare_stabilisers(scene, engines, folder, progress)
+    benches_of_roads, rows, failed = compare_stabilisers(scene, engines, output_folder, report_progress)
     options = benches_of_roads[0].options
-    progress("sweep of stiffness and cut-off", len(benches_of_roads) / (len(benches_of_roads) + 1))
+    report_progress("sweep of stiffness and cut-off", len(benches_of_roads) / (len(benches_of_roads) + 1))
     sweep = {bench.road: bench.sweep() for bench in benches_of_roads}
     table = summary_lines(rows, benches_of_roads, options)
-    write_whole(folder / "table.txt", "\n".join(table) + "\n")
-    with whole_file(folder / "score.csv") as partial_path, partial_path.open("w", newline="") as file:
+    write_whole(output_folder / "table.txt", "\n".join(table) + "\n")
+    with whole_file(output_folder / "score.csv") as partial_path, partial_path.open("w", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
     results = {name: result for bench in benches_of_roads for name, result in bench.results.items()}
     saved = result_from_table(scene, rows, "run")
     saved.data.attrs["error"] = _step_error_text(benches_of_roads[0].results)
-    saved.save(folder / "score.nc")
-    progress("figures", 1.0)
+    saved.save(output_folder / "score.nc")
+    report_progress("figures", 1.0)
     of_first = [row for row in rows if row["engine"] == engines[0]]
-    save(decision_figure(of_first, options.limits, options.grade, results), folder / "decide.png")
-    save(stiffness_figure(sweep, benches_of_roads[0], options.limits, options.grade), folder / "stiffness.png")
+    save(decision_figure(of_first, options.limits, options.grade, results), output_folder / "decide.png")
+    save(stiffness_figure(sweep, benches_of_roads[0], options.limits, options.grade), output_folder / "stiffness.png")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "rows": rows,
         "failed": failed,
         "results": results,
@@ -63,30 +63,30 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     }
 
 
-def _step_error_text(results: Results) -> str:
+def _step_error_text(score_results: Results) -> str:
     """JSON text of the step error of the score, which is that of the measurement, because all runs use its steps."""
-    error = json.loads(next(iter(results.values())).data.attrs["error"])
+    error = json.loads(next(iter(score_results.values())).data.attrs["error"])
     return json.dumps(
         error | {"how": f"{error['how']}, of the measurement, whose steps all runs share"} if error else {}
     )
 
 
 def summary_lines(
-    rows: list[FiguresRow], benches_of_roads: list[StabiliserBench], options: StabiliserOptions
+    score_rows: list[FiguresRow], benches_of_roads: list[StabiliserBench], study_options: StabiliserOptions
 ) -> list[str]:
     """Lines for the screen: a table of all methods, with a block for each engine and road."""
     lines = [
-        f"  Damage ratios: {COUNTING_CONVENTION}, exponent {options.slope:g}. Accepted: all four "
+        f"  Damage ratios: {COUNTING_CONVENTION}, exponent {study_options.slope:g}. Accepted: all four "
         "body-frame ratios within "
-        f"{options.limits.damage_error:.0%},",
-        f"  pitch within {options.limits.pitch_error:g} rad, artificial moment up to 15 Hz at most "
-        f"{options.limits.artificial_share:.0%} of I pitch''. The vertical f3 is never judged: it is blind.",
+        f"{study_options.limits.damage_error:.0%},",
+        f"  pitch within {study_options.limits.pitch_error:g} rad, artificial moment up to 15 Hz at most "
+        f"{study_options.limits.artificial_share:.0%} of I pitch''. The vertical f3 is never judged: it is blind.",
         "  * seconds by those of the free run, each run once",
     ]
-    for engine, road in dict.fromkeys((row["engine"], row["road"]) for row in rows):
-        of_engine = [row for row in rows if (row["engine"], row["road"]) == (engine, road)]
+    for engine, road in dict.fromkeys((row["engine"], row["road"]) for row in score_rows):
+        of_engine = [row for row in score_rows if (row["engine"], row["road"]) == (engine, road)]
         bench = next(bench for bench in benches_of_roads if bench.road == road)
-        road_text = "the road" if road == "road" else f"a grade of {options.grade:g} rad"
+        road_text = "the road" if road == "road" else f"a grade of {study_options.grade:g} rad"
         free = next(row["seconds"] for row in of_engine if row["method"] == "free")
         lines += [
             "",
@@ -108,13 +108,14 @@ UNITS_LINE = (
 )
 
 
-def _score_line(row: FiguresRow, free_seconds: float) -> str:
-    ratios = "".join(f"{_ratio_text(row[f'damage {channel}']):>7}" for channel in SECTION_FORCE_CHANNELS)
+def _score_line(score: FiguresRow, free_seconds: float) -> str:
+    ratios = "".join(f"{_ratio_text(score[f'damage {channel}']):>7}" for channel in SECTION_FORCE_CHANNELS)
     return (
-        f"  {row['method']:<25}{ratios}{_ratio_text(row['vertical damage f3']):>9}{row['pitch error max [rad]']:>9.4f}"
-        f"{row['pitch error rms [rad]']:>7.4f}{row['moment rms [N m]']:>7.0f}{row['moment max [N m]']:>8.0f}"
-        f"{row['moment share to 15 Hz']:>6.0%}{row['seconds'] / free_seconds:>8.1f}{row['verdict']:>11}"
-        f"{row['without truth']:>11}"
+        f"  {score['method']:<25}{ratios}{_ratio_text(score['vertical damage f3']):>9}"
+        f"{score['pitch error max [rad]']:>9.4f}{score['pitch error rms [rad]']:>7.4f}"
+        f"{score['moment rms [N m]']:>7.0f}{score['moment max [N m]']:>8.0f}"
+        f"{score['moment share to 15 Hz']:>6.0%}{score['seconds'] / free_seconds:>8.1f}{score['verdict']:>11}"
+        f"{score['without truth']:>11}"
     )
 
 

@@ -20,7 +20,7 @@ from models.tyre.assumptions import assumptions
 from models.tyre.tyre_table import TyreTable
 
 SYSTEM = "braking"
-Progress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 class Options(Strict):
@@ -39,7 +39,9 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     tyre_tables_of(scene)
 
 
-def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: BrakingScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Tabulate every tyre of the scene; saves ``tyre.png``, and for each tyre a netCDF and a CSV file that can be read
     as a tyre again; returns the summary."""
     from studies.tyre_figure import tyre_figure
@@ -48,13 +50,15 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     tables = tyre_tables_of(scene)
     answer = {name: table.characteristic_values(options.load) for name, table in tables.items()}
     results = {
-        name: save(scene, table, options, folder / f"{name.replace('/', '_').replace(' ', '_')}.csv")
+        name: save_tyre_friction(
+            scene, table, options, output_folder / f"{name.replace('/', '_').replace(' ', '_')}.csv"
+        )
         for name, table in tables.items()
     }
-    tyre_figure(tables, (options.slip_angles, options.load), scene.title, folder / "tyre.png", results)
+    tyre_figure(tables, (options.slip_angles, options.load), scene.title, output_folder / "tyre.png", results)
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": {},
         "answer": answer,
         "results": results,
@@ -62,11 +66,11 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     }
 
 
-def friction_lines(figures_by_tyre: dict[str, dict[str, float]], load: float) -> list[str]:
+def friction_lines(figures_by_tyre: dict[str, dict[str, float]], wheel_load: float) -> list[str]:
     """Lines for the screen: a table of the friction figures under a load (N), with a column per tyre."""
     width = max(12, *(len(name) + 2 for name in figures_by_tyre))
     rows = [
-        f"  {'mu under ' + format(load / 1e3, '.4g') + ' kN':<22}"
+        f"  {'mu under ' + format(wheel_load / 1e3, '.4g') + ' kN':<22}"
         + "".join(f"{name:>{width}}" for name in figures_by_tyre)
     ]
     keys = next(iter(figures_by_tyre.values()))
@@ -75,21 +79,22 @@ def friction_lines(figures_by_tyre: dict[str, dict[str, float]], load: float) ->
     ]
 
 
-def save(scene: BrakingScene, table: TyreTable, options: Options, path: Path) -> Result:
+def save_tyre_friction(scene: BrakingScene, tyre_table: TyreTable, study_options: Options, output_path: Path) -> Result:
     """Save a tyre's friction at zero and the options' slip angles, at all slips of its table, as netCDF and CSV;
     returns the result."""
-    angles, axes = np.unique([0.0, *options.slip_angles]), ("slip_angle", "slip")
-    x, y = table.friction(np.deg2rad(angles), table.slips, options.load)
+    angles, axes = np.unique([0.0, *study_options.slip_angles]), ("slip_angle", "slip")
+    x, y = tyre_table.friction(np.deg2rad(angles), tyre_table.slips, study_options.load)
     channels = {"mu_x": Channel(axes, x, "-", "along the wheel"), "mu_y": Channel(axes, y, "-", "across it")}
-    nodes = {"slip_angle": Channel("slip_angle", angles, "deg"), "slip": Channel("slip", table.slips, "-")}
-    read_off = result(scene, channels, nodes, load=options.load)
-    with_assumptions(read_off, assumptions(table, options.load))
+    nodes = {"slip_angle": Channel("slip_angle", angles, "deg"), "slip": Channel("slip", tyre_table.slips, "-")}
+    read_off = result(scene, channels, nodes, load=study_options.load)
+    with_assumptions(read_off, assumptions(tyre_table, study_options.load))
     not_estimated(read_off, "a table has no steps: it is read at its nodes, and linear between").save(
-        path.with_suffix(".nc")
+        output_path.with_suffix(".nc")
     )
-    angle, slip = (axis.ravel() for axis in np.meshgrid(angles, table.slips, indexing="ij"))
+    angle, slip = (axis.ravel() for axis in np.meshgrid(angles, tyre_table.slips, indexing="ij"))
     write_table(
-        path, {"slip angle": ("deg", angle), "slip": ("-", slip), "mu_x": ("-", x.ravel()), "mu_y": ("-", y.ravel())}
+        output_path,
+        {"slip angle": ("deg", angle), "slip": ("-", slip), "mu_x": ("-", x.ravel()), "mu_y": ("-", y.ravel())},
     )
     return read_off
 

@@ -18,8 +18,8 @@ def tyre_figure(
     tyre_tables: Mapping[str, TyreTable],
     angles_and_load: tuple[Sequence[float], float],
     title: str,
-    path: Path,
-    results: Results,
+    figure_path: Path,
+    shown_results: Results,
 ) -> None:
     """Save a figure with a row per tyre table: mu_x over slip, mu_y over slip, and mu_y over mu_x. angles_and_load :
     slip angles (deg) of the curves, and the load (N)."""
@@ -39,5 +39,5 @@ def tyre_figure(
             xlabel="μx [-]", ylabel="μy [-]", xlim=(0, top), ylim=(0, top), aspect="equal", title="Both, slip 0 to 1"
         )
     legend_below(figure, axes[0, 0], column_count=len(angles))
-    add_heading(figure, f"{title}: friction under {load / 1e3:.4g} kN, by slip angle", results)
-    save(figure, path)
+    add_heading(figure, f"{title}: friction under {load / 1e3:.4g} kN, by slip angle", shown_results)
+    save(figure, figure_path)

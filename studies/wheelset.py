@@ -23,42 +23,49 @@ from models.systems.wheelset.run import run as run_path
 from models.systems.wheelset.scene import WheelsetScene
 
 SYSTEM = "wheelset"
-Progress = Callable[[str, float], None]
-Paths = dict[str, dict[float, Result]]
+ReportProgress = Callable[[str, float], None]
+RunsByEngineAndSpeed = dict[str, dict[float, Result]]
 """Result of each run, by engine and speed (m/s)."""
 
 
-def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+def run(
+    scene: WheelsetScene, engines: tuple[str, ...], output_folder: Path, report_progress: ReportProgress
+) -> dict[str, Any]:
     """Compute eigenvalues over speed, and runs at the scene's speeds; saves ``eigenvalues.nc``, ``paths.nc``,
     ``over_speed.csv`` and figures, and returns the summary."""
-    from studies.wheelset_figures import creep_figure, paths_figure, stability_figure
+    from studies.wheelset_figures import creep_force_figure, lateral_motion_figure, stability_figure
 
-    wheelset, failed, eigenvalues, paths = wheelset_of(scene), dict[str, str](), dict[str, Result](), Paths()
+    wheelset, failed, eigenvalues, paths = (
+        wheelset_of(scene),
+        dict[str, str](),
+        dict[str, Result](),
+        RunsByEngineAndSpeed(),
+    )
     conicities = conicity.run(scene) if conicity.reports_conicity(scene) else None
     for i, engine in enumerate(engines):
         try:
-            progress(f"eigenvalues of {engine}", i / len(engines))
+            report_progress(f"eigenvalues of {engine}", i / len(engines))
             eigenvalues[engine] = linearised_result(scene, engine, estimate_error=scene.error)
-            progress(f"paths of {engine}", (i + 0.5) / len(engines))
+            report_progress(f"paths of {engine}", (i + 0.5) / len(engines))
             paths[engine] = {speed: run_path(scene, engine, speed, error=scene.error) for speed in path_speeds(scene)}
         except RunFailed as error:
             failed[engine] = str(error)
     linear = {engine: result.detail for engine, result in eigenvalues.items()}
     if linear:
-        joined_result(join_results(eigenvalues, "engine"), eigenvalues).save(folder / "eigenvalues.nc")
-        _save_table(linear, folder)
-        stability_figure(eigenvalues, wheelset, scene.title, folder / "stability.png")
+        joined_result(join_results(eigenvalues, "engine"), eigenvalues).save(output_folder / "eigenvalues.nc")
+        _save_speed_table(linear, output_folder)
+        stability_figure(eigenvalues, wheelset, scene.title, output_folder / "stability.png")
     if paths:
-        over_speeds(paths).save(folder / "paths.nc")
-        paths_figure(paths, scene.title, folder / "paths.png")
-        creep_figure(next(iter(paths.values())), scene.title, folder / "creep.png")
+        over_speeds(paths).save(output_folder / "paths.nc")
+        lateral_motion_figure(paths, scene.title, output_folder / "paths.png")
+        creep_force_figure(next(iter(paths.values())), scene.title, output_folder / "creep.png")
     if conicities:
-        conicities.save(folder / "conicity.nc")
+        conicities.save(output_folder / "conicity.nc")
     return {
         "scene": scene.title,
-        "folder": str(folder),
+        "folder": str(output_folder),
         "failed": failed,
-        "answer": _summary_of_paths(wheelset, linear, paths)
+        "answer": _summary_of_runs(wheelset, linear, paths)
         | (conicity.conicity_numbers(conicities) if conicities else {}),
         "results": {
             **_results_by_name(paths),
@@ -69,31 +76,33 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
             *(conicity.conicity_lines(conicities.detail) if conicities else []),
             *_wavelength_lines(wheelset, linear),
             *_stability_lines(wheelset, linear),
-            *_path_lines(scene, paths),
+            *_run_lines(scene, paths),
         ],
     }
 
 
-def _results_by_name(paths: Paths) -> dict[str, Result]:
+def _results_by_name(wheelset_runs: RunsByEngineAndSpeed) -> dict[str, Result]:
     """Results of all runs, by a name of engine and speed."""
     return {
         f"{engine}, {speed_text}": path
-        for engine, paths_of_engine in paths.items()
+        for engine, paths_of_engine in wheelset_runs.items()
         for speed_text, path in results_by_speed_text(paths_of_engine).items()
     }
 
 
-def _save_table(linear_results: dict[str, LinearisedMotion], folder: Path) -> None:
+def _save_speed_table(linear_results: dict[str, LinearisedMotion], output_folder: Path) -> None:
     """Save a CSV table of growth rate (1/s), and damping and frequency of hunting, over speed."""
     columns = {"speed": ("m/s", next(iter(linear_results.values())).speeds)}
     for engine, linear_run in linear_results.items():
         columns[f"{engine} growth"] = ("1/s", linear_run.values.real.max(axis=1))
         columns[f"{engine} hunting damping"] = ("1/s", -linear_run.hunting_eigenvalue.real)
         columns[f"{engine} hunting frequency"] = ("Hz", linear_run.hunting_eigenvalue.imag / (2.0 * np.pi))
-    write_table(folder / "over_speed.csv", columns)
+    write_table(output_folder / "over_speed.csv", columns)
 
 
-def _summary_of_paths(wheelset: Wheelset, linear_results: dict[str, LinearisedMotion], paths: Paths) -> dict[str, Any]:
+def _summary_of_runs(
+    wheelset: Wheelset, linear_results: dict[str, LinearisedMotion], wheelset_runs: RunsByEngineAndSpeed
+) -> dict[str, Any]:
     """Summary in SI units: wavelengths, critical speed by engine (None if there is none), and largest power of the
     creep forces."""
     return {
@@ -102,7 +111,7 @@ def _summary_of_paths(wheelset: Wheelset, linear_results: dict[str, LinearisedMo
         "critical_speed": {engine: linear_run.critical_speed for engine, linear_run in linear_results.items()},
         "largest_power": {
             engine: max(float(path["power"].max()) for path in paths_of_engine.values())
-            for engine, paths_of_engine in paths.items()
+            for engine, paths_of_engine in wheelset_runs.items()
         },
     }
 
@@ -143,19 +152,21 @@ def _stability_lines(wheelset: Wheelset, linear_results: dict[str, LinearisedMot
     ]
 
 
-def _critical_speed_text(critical_speed: float | None, reason: str, first_critical_speed: float | None = None) -> str:
+def _critical_speed_text(
+    critical_speed: float | None, missing_reason: str, first_critical_speed: float | None = None
+) -> str:
     if critical_speed is None:
-        return f"none: the wheelset {reason}"
+        return f"none: the wheelset {missing_reason}"
     return f"{critical_speed:>14.9g} m/s" + (
         f" {critical_speed / first_critical_speed - 1:+.0e} from the first" if first_critical_speed else ""
     )
 
 
-def _path_lines(scene: WheelsetScene, paths: Paths) -> list[str]:
+def _run_lines(scene: WheelsetScene, wheelset_runs: RunsByEngineAndSpeed) -> list[str]:
     """Lines for the screen on the end of each run, the differences between the engines, and the energy balance."""
-    if not paths:
+    if not wheelset_runs:
         return []
-    (name, first), *other_paths = paths.items()
+    (name, first), *other_paths = wheelset_runs.items()
     lines = [f"  paths, by {name}, with {scene.contact.law}"]
     for speed, path in first.items():
         motion, power = path.detail, path["power"]
@@ -175,12 +186,12 @@ def _path_lines(scene: WheelsetScene, paths: Paths) -> list[str]:
     return lines
 
 
-def _ending_text(motion: Motion) -> str:
+def _ending_text(wheelset_motion: Motion) -> str:
     """Text on a run's last lateral amplitude, and its change in the last cycle."""
-    y = motion.states[:, Y]
+    y = wheelset_motion.states[:, Y]
     tops = y[positive_maxima(y)]
     if tops.size < 2:
-        return f"ends at {1e3 * motion.states[-1, Y]:.3g} mm without a second maximum"
+        return f"ends at {1e3 * wheelset_motion.states[-1, Y]:.3g} mm without a second maximum"
     return f"last amplitude {1e3 * tops[-1]:.4g} mm, {100 * (tops[-1] / tops[-2] - 1):+.3g} % in the last cycle"
 
 

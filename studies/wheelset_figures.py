@@ -35,24 +35,26 @@ SHOWN_SECONDS = 1.0
 
 
 def _write_note(
-    axis: Axes, text: str, point: tuple[float, float], text_offset: tuple[float, float], **style: Any
+    axis: Axes, note_text: str, noted_point: tuple[float, float], text_offset: tuple[float, float], **text_style: Any
 ) -> None:
     """Write text beside a point of a plot; the text's right end is shifted from the point by ``text_offset`` (printer's
     points).
     """
-    axis.annotate(text, point, text_offset, textcoords="offset points", ha="right", **style)
+    axis.annotate(note_text, noted_point, text_offset, textcoords="offset points", ha="right", **text_style)
 
 
-def _patch_sums_of_wheels(contacts: np.ndarray, *names: str) -> Iterator[tuple[str, str, list[np.ndarray]]]:
+def _patch_sums_of_wheels(patch_table: np.ndarray, *quantity_names: str) -> Iterator[tuple[str, str, list[np.ndarray]]]:
     """Yield for each wheel its name, its colour, and sums (n,) over its contact patches of the named quantities."""
-    patches_per_wheel = contacts.shape[1] // 2
-    yield "right wheel", BLUE, [contacts[name][:, :patches_per_wheel].sum(axis=1) for name in names]
-    yield "left wheel", VERMILION, [contacts[name][:, patches_per_wheel:].sum(axis=1) for name in names]
+    patches_per_wheel = patch_table.shape[1] // 2
+    yield "right wheel", BLUE, [patch_table[name][:, :patches_per_wheel].sum(axis=1) for name in quantity_names]
+    yield "left wheel", VERMILION, [patch_table[name][:, patches_per_wheel:].sum(axis=1) for name in quantity_names]
 
 
-def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, title: str, path: Path) -> None:
+def stability_figure(
+    eigenvalues_by_engine: Mapping[str, Result], wheelset: Wheelset, title: str, figure_path: Path
+) -> None:
     """Save a figure of growth rate and wavelength of the hunting motion over speed, and of its root locus."""
-    linear: dict[str, LinearisedMotion] = {engine: result.detail for engine, result in eigenvalues.items()}
+    linear: dict[str, LinearisedMotion] = {engine: result.detail for engine, result in eigenvalues_by_engine.items()}
     figure, (left, middle, right) = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.8))
     for engine, linear_run in linear.items():
         style: Any = {"color": COLOURS[engine], "label": LABELS[engine]}
@@ -104,15 +106,16 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
     right.margins(x=0.6)
     middle.margins(y=0.2)
     legend_below(figure, left)
-    add_heading(figure, f"{title}\nLinear creep, all motions of the wheelset", eigenvalues)
-    save(figure, path)
+    add_heading(figure, f"{title}\nLinear creep, all motions of the wheelset", eigenvalues_by_engine)
+    save(figure, figure_path)
 
 
-def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path: Path) -> None:
+def lateral_motion_figure(runs_by_engine: Mapping[str, Mapping[float, Result]], title: str, figure_path: Path) -> None:
     """Save a figure of the lateral displacement over time, with a panel per speed, and below it the difference of each
     engine from the first."""
     paths: dict[str, dict[float, Motion]] = {
-        engine: {speed: result.detail for speed, result in path_then.items()} for engine, path_then in results.items()
+        engine: {speed: result.detail for speed, result in path_then.items()}
+        for engine, path_then in runs_by_engine.items()
     }
     name, first = next(iter(paths.items()))
     rows = (2, 1) if len(paths) > 1 else (2,)
@@ -135,16 +138,16 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
     legend_below(figure, axes[0, 0])
     runs_by_name = {
         f"{engine}, {speed_of_path}": run
-        for engine, path_then in results.items()
+        for engine, path_then in runs_by_engine.items()
         for speed_of_path, run in results_by_speed_text(path_then).items()
     }
     add_heading(figure, f"{title}: the same path in every implementation", runs_by_name)
-    save(figure, path)
+    save(figure, figure_path)
 
 
-def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> None:
+def creep_force_figure(runs_by_speed: Mapping[float, Result], title: str, figure_path: Path) -> None:
     """Save a figure of the creep forces on each wheel, and of their power, over the last second of every run."""
-    paths: dict[float, Motion] = {speed: result.detail for speed, result in results.items()}
+    paths: dict[float, Motion] = {speed: result.detail for speed, result in runs_by_speed.items()}
     figure, axes = subplots(3, len(paths), figsize=(COLUMN_WIDTH, 6.0), squeeze=False, sharex="col")
     for k, (speed, course) in enumerate(paths.items()):
         is_last_second = course.times >= course.times[-1] - SHOWN_SECONDS
@@ -158,14 +161,14 @@ def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> Non
     legend_below(figure, axes[0, 0])
     largest = max(float(course.contacts["power"].max()) for course in paths.values())
     subtitle = f"Creep forces on the wheels and their power, at any time {largest:.3g} W or less"
-    add_heading(figure, f"{title}\n{subtitle}", results_by_speed_text(results))
-    save(figure, path)
+    add_heading(figure, f"{title}\n{subtitle}", results_by_speed_text(runs_by_speed))
+    save(figure, figure_path)
 
 
-def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) -> None:
+def limit_cycle_branch_figure(limit_cycle_branch: Result, wheelset: Wheelset, title: str, figure_path: Path) -> None:
     """Save a figure of amplitude and frequency of the limit cycles over speed: stable ones filled, unstable ones
     open."""
-    orbits: Sequence[Orbit] = branch.detail
+    orbits: Sequence[Orbit] = limit_cycle_branch.detail
     figure, (left, middle, right) = subplots(1, 3, figsize=(COLUMN_WIDTH, 3.8))
     speeds, amplitudes, frequencies = (
         np.array([getattr(orbit, name) for orbit in orbits]) for name in ("speed", "amplitude", "frequency")
@@ -192,14 +195,14 @@ def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) ->
     left.set_title("Amplitude")
     right.set(ylabel="frequency [Hz]", title="Frequency")
     legend_below(figure, left, right, column_count=3)
-    add_heading(figure, title, {"branch": branch})
-    save(figure, path)
+    add_heading(figure, title, {"branch": limit_cycle_branch})
+    save(figure, figure_path)
 
 
-def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
+def limit_cycle_figure(cycles_by_engine: Mapping[str, Result], title: str, figure_path: Path) -> None:
     """Save a figure of the limit cycle as yaw over lateral displacement in every engine, and of its creep forces over a
     period."""
-    cycles: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
+    cycles: dict[str, Orbit] = {engine: result.detail for engine, result in cycles_by_engine.items()}
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 4.2))
     for engine, orbit in cycles.items():
         states = orbit.path().states[:: 1 if engine == "reference" else 16]
@@ -219,14 +222,14 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
     right.set(xlabel="time [s]", ylabel="creep force [kN]", title="Creep forces in one period")
     left.legend()
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
-    add_heading(figure, f"{title}\nOne cycle, the same in every implementation", results)
-    save(figure, path)
+    add_heading(figure, f"{title}\nOne cycle, the same in every implementation", cycles_by_engine)
+    save(figure, figure_path)
 
 
-def conicity_figure(run: Result, title: str, path: Path) -> None:
+def conicity_figure(conicity_result: Result, title: str, figure_path: Path) -> None:
     """Save a figure of the rolling radius difference over lateral displacement, with the amplitudes of the waves, and
     of both equivalent conicities over the amplitude."""
-    conicities: Conicities = run.detail
+    conicities: Conicities = conicity_result.detail
     figure, (left, right) = subplots(1, 2, figsize=(COLUMN_WIDTH, 3.6))
     table, rows = conicities.table, conicities.rows
     left.plot(1e3 * table.displacements, 1e3 * table.differences, color=BLUE, label="right less left")
@@ -250,5 +253,5 @@ def conicity_figure(run: Result, title: str, path: Path) -> None:
     handles, labels = left.get_legend_handles_labels()
     named = dict(zip(labels, handles, strict=True))  # every wave by one entry
     left.legend(list(named.values()), list(named))
-    add_heading(figure, title, {"conicity": run})
-    save(figure, path)
+    add_heading(figure, title, {"conicity": conicity_result})
+    save(figure, figure_path)

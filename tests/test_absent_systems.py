@@ -21,7 +21,7 @@ from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, load
 from models.systems.braking.effects import TABLE
 from models.systems.braking.scene import build
 from models.systems.pitch_plane.scene import build as build_half_car
-from studies.command.asked import SCENES_FOLDER, plan_of
+from studies.command.asked import SCENES_FOLDER, plan_module_of
 from validation.absence.of_systems import (
     absence_module_of,
     addable_effects,
@@ -120,7 +120,7 @@ def test_every_effect_of_every_system_can_be_listed_and_judged(system):
 
 def test_a_plan_lists_effects_and_what_is_absent():
     scene = load(SCENES_FOLDER / "contact_ellipse.toml")
-    told = plan_of(scene).describe(scene)
+    told = plan_module_of(scene).describe(scene)
     assert "effect     saturation: " in told
     assert "absent     any_shape, falling_friction, half_space, profiles (not" in told
 

@@ -48,8 +48,8 @@ def test_names_units_and_time_shift_are_found(run, tmp_path):
 def test_an_error_is_told_in_size_and_place(run, tmp_path):
     """A gauge that reads 3 % too much: the rms error is 3 % of the rms value; noise of 10 % is told as 10 %."""
     scaled = overlay_of_run(run, measured(run, tmp_path / "a.csv", ["f1 [N]"], [1.03])).matches[0]
-    assert scaled.rms == pytest.approx(0.03 / 1.03 * np.sqrt(np.mean(scaled.measured**2)), rel=2e-2)
-    assert abs(scaled.peak) == pytest.approx(0.03 / 1.03 * np.abs(scaled.measured).max(), rel=5e-2)
+    assert scaled.rms == pytest.approx(0.03 / 1.03 * np.sqrt(np.mean(scaled.measured_values**2)), rel=2e-2)
+    assert abs(scaled.peak) == pytest.approx(0.03 / 1.03 * np.abs(scaled.measured_values).max(), rel=5e-2)
     noisy = overlay_of_run(run, measured(run, tmp_path / "b.csv", ["f1 [N]"], [1.0], noise=0.1))
     assert noisy.matches[0].relative == pytest.approx(0.1 / np.sqrt(1.01), rel=0.15)
     assert noisy.shift.seconds == pytest.approx(LATE, abs=1e-3)

@@ -19,7 +19,7 @@ from models.systems.braking.procedures import vehicle_and_start_state
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
 from models.systems.braking.stop_report import StopHistory
-from studies.braking import figures_lines
+from studies.braking import figures_of_merit_lines
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
 PLAIN = {"title": "t", "system": "braking", "run": {"duration": 0.3}, "procedures": {"stop": {"speed": 10.0}}}
@@ -264,4 +264,4 @@ def test_adhesion_of_an_axle_that_does_not_lock_is_not_told():
 
 def test_a_run_that_ends_before_the_vehicle_stands_says_so():
     stop = StopHistory(drive(scene()).detail)
-    assert "not stopped by 0.3025 s, still 9.7" in figures_lines("stop", stop, {}, {})[0]
+    assert "not stopped by 0.3025 s, still 9.7" in figures_of_merit_lines("stop", stop, {}, {})[0]

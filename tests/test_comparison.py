@@ -46,8 +46,8 @@ def test_another_step_is_read_by_a_spline_and_said(run, tmp_path):
     coarse = simulate(road_scene(duration=0.1, step=5e-4), "reference")
     found, _ = compare(saved(run, tmp_path / "a.nc"), saved(coarse, tmp_path / "b.nc"))
     states = {each.name: each for each in found}
-    assert states["pitch"].note and states["pitch"].largest < 1e-7  # order 4 and a cubic spline on 0.25 ms
-    assert "only from" not in states["pitch"].note
+    assert states["pitch"].rows_note and states["pitch"].largest < 1e-7  # order 4 and a cubic spline on 0.25 ms
+    assert "only from" not in states["pitch"].rows_note
 
 
 def test_a_shorter_run_is_compared_as_far_as_it_lasts_and_this_is_said(run):

@@ -16,7 +16,7 @@ from docs.pages import ROOT, example_blocks, pages
 from models.core.errors import InputError
 from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, of_table
 from models.vehicles.vehicle_file import build_vehicle
-from studies.command.asked import KNOWN_SYSTEMS, SCENES_FOLDER, engines_of, plan_of
+from studies.command.asked import KNOWN_SYSTEMS, SCENES_FOLDER, plan_module_of, requested_engines
 
 PAGES = {str(page.relative_to(ROOT)): page for page in pages()}
 each_page = pytest.mark.parametrize("name", PAGES)
@@ -109,7 +109,7 @@ def test_every_scene_and_vehicle_of_the_pages_is_valid(name, text, empty_folder)
     elif "title" in table:
         try:
             scene = of_table(table, name, empty_folder, KNOWN_SYSTEMS)
-            plan_of(scene).check(scene, engines_of(None, scene.system)[:1])
+            plan_module_of(scene).check(scene, requested_engines(None, scene.system)[:1])
         except InputError as refused:
             assert "no such file" in str(refused)
 

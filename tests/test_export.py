@@ -29,7 +29,7 @@ from models.systems.ride.of_scene import vehicle_of
 from models.systems.wheelset.of_scene import equations_of
 from models.vehicles.cut_vehicle import cut
 from studies.command.asked import load_scene
-from studies.command.export import exported_text
+from studies.command.export import exported_vehicle
 from validation.spatial.cars import r19, rough_car, twin
 
 STATES, SEED = 20, 5
@@ -106,7 +106,7 @@ def bare_exudyn(mbs):
 
 def text_of(scene, engine):
     """Text of an exported file; what it leaves out stands in it."""
-    answer = exported_text(scene, engine)
+    answer = exported_vehicle(scene, engine)
     assert all(text.replace("--", "- -") in answer.text for text in answer.left_out)
     return answer.text
 
@@ -115,7 +115,7 @@ def text_of(scene, engine):
 @pytest.mark.parametrize("engine", ["mujoco", "exudyn"])
 def test_the_pitch_plane_alone_moves_as_in_the_product(engine, geometry, tmp_path):
     scene = load_scene("six_runs", [f"vehicle.geometry={geometry}", "vehicle.override.k1=1.9e5"])
-    answer = exported_text(scene, engine)
+    answer = exported_vehicle(scene, engine)
     assert answer.left_out == ("road under the tyres, flat here",)
     settings = Settings({"mujoco": "RK4", "exudyn": "RK44"}[engine], 1e-3, 1.0)
     product = build(engine, replace(assembly_of_scene(scene), mode="free", input=None), settings)
@@ -196,7 +196,7 @@ def test_a_car_on_its_carrier_alone_moves_as_in_the_product(engine, system, tmp_
     else:
         product = bare_mujoco(compiled_model(replace(driven, vehicle=realisable(driven.vehicle)[0])))
     assert error(text, engine, product, size, tmp_path) < 1e-10
-    named = exported_text(scene, engine).left_out
+    named = exported_vehicle(scene, engine).left_out
     parts = [*driven.vehicle.springs, *driven.vehicle.bars, *driven.vehicle.tyres]
     assert all(any(repr(part.name) in text for text in named) for part in parts)
 

@@ -106,14 +106,14 @@ def test_a_free_vehicle_may_run_for_an_hour(engine):
     """Its double zero eigenvalues must not be taken for growth."""
     base = setups.vehicle()
     free = setups.driven_by_forces(base, setups.static_forces(base, 10, 1.0))
-    stability.check_step(engine, free, setups.settings(engine, 1e-3, 3600.0))
+    stability.check_step(engine, free, setups.run_settings(engine, 1e-3, 3600.0))
 
 
 @pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
 def test_a_first_order_step_may_feed_a_weakly_damped_mode_a_little(engine):
     base = setups.vehicle(d1=0.0, d2=0.0, d3=10.0, d4=10.0)
     name = {"exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine]
-    stability.check_step(engine, base, setups.settings(engine, 1e-6, 1.0, name))
+    stability.check_step(engine, base, setups.run_settings(engine, 1e-6, 1.0, name))
 
 
 @pytest.fixture(scope="module")
@@ -201,7 +201,7 @@ def test_an_interrupt_in_exudyn_is_an_interrupt(monkeypatch):
 
 def test_held_forces_beside_a_prescribed_pitch_do_not_hold_the_pitch():
     base = setups.vehicle()
-    forces = setups.static_forces(base, 300, 1e-3, noise=500.0)
+    forces = setups.static_forces(base, 300, 1e-3, noise_deviation=500.0)
     pitch = setups.smooth_pitch(0.02 * np.sin(6.0 * 1e-3 * np.arange(301)), 1e-3)
     assembly = setups.guided_vehicle(base, forces, pitch)
     fine = setups.run("reference", assembly, 1.25e-4, 0.2).states[::8]

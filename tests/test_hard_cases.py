@@ -18,7 +18,7 @@ from models.systems.pitch_plane.effects import lift_off
 from models.vehicles import pitch_plane
 from validation.cases import hard_cases
 from validation.hard_cases import (
-    FAMILIES,
+    CASE_FAMILIES,
     cases_by_family,
     catalogue,
     contact_points,
@@ -31,12 +31,15 @@ from validation.hard_cases import (
     sampled_input,
     stepping,
 )
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, judge
+from validation.hard_cases.case import IMPLEMENTATIONS, HardCase, judge
 
 ALL = tuple(case for _, case in cases_by_family())
 QUICK = {case.name for _, case in hard_cases.cases_of_quick_run(cases_by_family())}
 JUDGED = [
-    pytest.param(case, name, id=f"{case.name}-{name}") for case in ALL if case.name in QUICK for name in case.judged()
+    pytest.param(case, name, id=f"{case.name}-{name}")
+    for case in ALL
+    if case.name in QUICK
+    for name in case.judged_engines()
 ]
 """The quick share; all of them are rows of the full case ``hard_cases`` of tests/test_cases.py."""
 
@@ -44,7 +47,7 @@ JUDGED = [
 @pytest.mark.parametrize(("case", "implementation"), JUDGED)
 def test_outcome(case, implementation, tmp_path):
     outcome = judge(case, implementation, tmp_path)
-    assert outcome.word == case.wanted(implementation), (outcome.error, case.tolerance, outcome.message)
+    assert outcome.word == case.wanted_outcome(implementation), (outcome.error, case.tolerance, outcome.message)
 
 
 def test_there_are_enough_cases_with_names_of_their_own():
@@ -163,18 +166,22 @@ def broken(engine, folder):
 
 
 def test_a_bug_is_no_outcome(tmp_path):
-    case = Case("", "", "", "", 0.0, "", broken)
+    case = HardCase("", "", "", "", 0.0, "", broken)
     with pytest.raises(KeyError):
         judge(case, "reference", tmp_path)
 
 
 def test_not_a_number_is_silent(tmp_path):
-    case = Case("", "", "", "", 1.0, "", lambda engine, folder: np.nan)
+    case = HardCase("", "", "", "", 1.0, "", lambda engine, folder: np.nan)
     assert judge(case, "reference", tmp_path).word == "SILENT"
 
 
 def test_a_silent_case_fails_its_row_and_the_total(monkeypatch, tmp_path):
-    cases = (Case("bad", "hard", "check", "m", 1.0, "why", lambda engine, folder: 2.0, naive=lambda folder: "worse"),)
+    cases = (
+        HardCase(
+            "bad", "hard", "check", "m", 1.0, "why", lambda engine, folder: 2.0, naive_result=lambda folder: "worse"
+        ),
+    )
     monkeypatch.setattr(hard_cases, "cases_by_family", lambda: tuple(("bad", case) for case in cases))
     rows, data = hard_cases.measure(True, tmp_path)
     assert [row.status for row in rows] == ["failed"] * 6
@@ -187,14 +194,14 @@ def test_a_silent_case_fails_its_row_and_the_total(monkeypatch, tmp_path):
 
 def test_every_file_of_the_folder_is_a_family_in_the_table():
     files = {path.stem for path in Path(invariants.__file__).parent.glob("*.py")}
-    assert set(FAMILIES) == files - {"__init__", "case", "catalogue", "setups"} and len(FAMILIES) >= 25
+    assert set(CASE_FAMILIES) == files - {"__init__", "case", "catalogue", "setups"} and len(CASE_FAMILIES) >= 25
 
 
 def test_the_quick_share_has_cases_of_every_family():
     known = cases_by_family()
     own = hard_cases.cases_of_quick_run(known)
-    assert {family for family, _ in own} == set(FAMILIES) and all(pair in known for pair in own)
-    assert len(own) <= len(FAMILIES) + len(known) / hard_cases.QUICK_CASE_SPACING
+    assert {family for family, _ in own} == set(CASE_FAMILIES) and all(pair in known for pair in own)
+    assert len(own) <= len(CASE_FAMILIES) + len(known) / hard_cases.QUICK_CASE_SPACING
 
 
 def test_every_number_of_the_catalogue_has_its_cases():
@@ -212,8 +219,16 @@ def test_there_are_eighty_cases_without_the_measurement_files():
 
 
 def test_a_refusal_that_is_wanted_passes_its_row_also_where_no_implementation_has_a_part():
-    case = Case(
-        "odd", "hard", "check", "", 0.0, "why", broken, dict.fromkeys(IMPLEMENTATIONS, "refused"), without_engine=True
+    case = HardCase(
+        "odd",
+        "hard",
+        "check",
+        "",
+        0.0,
+        "why",
+        broken,
+        dict.fromkeys(IMPLEMENTATIONS, "refused"),
+        is_without_engine=True,
     )
     row = hard_cases._outcome_row(case, "reference", hard_cases.CaseOutcome("refused"))
     assert (row.id, row.status) == ("hard.odd.any", "passed")

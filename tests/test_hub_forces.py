@@ -24,7 +24,7 @@ from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import StatedDeviations, estimate_tilt, inputs_with_moments
 from models.vehicles.cut_vehicle import PITCH, ROLL, cut, rigid_vehicle
 from models.vehicles.spatial_linear import linearise
-from studies.hub_forces import save
+from studies.hub_forces import save_measurement_and_runs
 from validation.cases import hub_forces as case
 from validation.spatial.cars import r19, static_forces, twin
 
@@ -177,7 +177,7 @@ def test_steps_that_the_road_is_too_fast_for_are_told():
 def test_a_file_of_ones_own(tmp_path, measured):
     scene = scene_of({**ALL, "run": {"duration": 0.5}}, "s.toml")
     comparison = compare_stabilisers(scene, ("mujoco",))
-    save(comparison, tmp_path)
+    save_measurement_and_runs(comparison, tmp_path)
     own = {**ALL, "run": {"duration": 0.5}, "forces": {"file": "hub_forces.csv"}, "angles": {"file": "angles.csv"}}
     del own["road"]
     again = compare_stabilisers(scene_of(own, "s.toml", tmp_path), ("mujoco",))

@@ -13,7 +13,7 @@ from models.systems.hub_forces.comparison import planned_runs
 from models.systems.hub_forces.measurement import recorded_measurement
 from models.systems.hub_forces.run import measure
 from models.systems.hub_forces.scene import build
-from studies.command.asked import plan_of
+from studies.command.asked import plan_module_of
 
 NOISES = ("angle_noise", "force_noise")
 ON_ROAD = {
@@ -45,7 +45,7 @@ def test_each_noise_leaves_alone_and_without_both_transducers_tell_the_truth():
 def test_what_is_stated_stays_without_noise():
     quiet = scene_without(scene(angles={"angle_deviation": 0.01}), *NOISES)
     assert quiet.angles.deviations == (0.01, 5e-3)  # the filter weighs by it, and needs some
-    told = plan_of(quiet).describe(quiet)
+    told = plan_module_of(quiet).describe(quiet)
     assert "  noise      none\n" in told and "absent     angle_noise, force_noise, held_forces, kalman_filter" in told
 
 

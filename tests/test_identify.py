@@ -173,13 +173,13 @@ def test_bands_hold_what_was_measured(scene: SingleTrackScene) -> None:
 def test_resumed_is_the_same(scene: SingleTrackScene, tmp_path: Path) -> None:
     """Stages that are kept give the same bits."""
     path = measured(scene)
-    whole = identify(begun(scene), path, KEYS, low_pass=5.0, folder=tmp_path / "kept")
+    whole = identify(begun(scene), path, KEYS, low_pass=5.0, stages_folder=tmp_path / "kept")
     stages = sorted((tmp_path / "kept" / "stages").glob("block*"))
     stages[-1].unlink()
-    again = identify(begun(scene), path, KEYS, low_pass=5.0, folder=tmp_path / "kept")
+    again = identify(begun(scene), path, KEYS, low_pass=5.0, stages_folder=tmp_path / "kept")
     assert np.array_equal(whole.fit.values, again.fit.values)
     with pytest.raises(InputError, match="another job"):
-        identify(begun(scene), path, KEYS, low_pass=4.0, folder=tmp_path / "kept")
+        identify(begun(scene), path, KEYS, low_pass=4.0, stages_folder=tmp_path / "kept")
 
 
 def test_profile_of_a_straight_problem_is_a_parabola() -> None:

@@ -18,7 +18,7 @@ from models.vehicles.parameters import asymmetric_twin, itwm_drift
 from models.vehicles.plausible import plausible
 from models.vehicles.plausible_plane import plausible_plane
 from models.vehicles.vehicle_file import SHIPPED_FOLDER, load_vehicle, shipped_vehicles
-from studies.command.asked import findings_of, load_scene
+from studies.command.asked import input_findings_of, load_scene
 from validation.common.scenes import road_scene
 
 TWIN, DURATION, PERIOD = asymmetric_twin.PARAMETERS, 20.0, 1e-3
@@ -147,7 +147,7 @@ def scene(folder, forces, extra=""):
 
 def test_a_doubt_is_printed_saved_and_taken_into_the_trust(tmp_path):
     own = scene(tmp_path, 0.95 * true()[0])
-    assert ["falls" in finding.text for finding in findings_of(own)] == [True]
+    assert ["falls" in finding.text for finding in input_findings_of(own)] == [True]
     result = simulate(own, "reference")
     assert "falls" in json.loads(result.data.attrs["doubts"])[0] and "doubt" in result.data.attrs["status"]
     assert abs(result["z3"][-1]) > 80.0  # as the doubt says
@@ -156,7 +156,7 @@ def test_a_doubt_is_printed_saved_and_taken_into_the_trust(tmp_path):
 
     assert "mean of the wheel forces" in trust_line(assembly_of_scene(own))[0]
     accepted = scene(tmp_path, 0.95 * true()[0], 'accept = ["weight"]\n')
-    assert not findings_of(accepted)
+    assert not input_findings_of(accepted)
 
 
 @pytest.mark.parametrize("unit, said", [("s", "head the column time"), ("ms", "correct the unit")])
@@ -167,7 +167,9 @@ def test_a_prescribed_pitch_with_times_of_another_unit_is_told(tmp_path, unit, s
     rows = "\n".join(f"{time:.9g},{value:.9g}" for time, value in zip(times, pitch, strict=True))
     (tmp_path / "p.csv").write_text(f"time [{unit}],pitch [rad]\n{rows}\n")
     try:
-        told = [f.text for f in findings_of(scene(tmp_path, forces, '[effects.prescribed_pitch]\nfile = "p.csv"\n'))]
+        told = [
+            f.text for f in input_findings_of(scene(tmp_path, forces, '[effects.prescribed_pitch]\nfile = "p.csv"\n'))
+        ]
     except InputError as error:
         told = [str(error)]
     assert len(told) == 1 and said in told[0]
@@ -182,10 +184,10 @@ SAMPLES = {
 @pytest.mark.parametrize("kind", SAMPLES)
 def test_samples_that_no_wheel_felt_are_doubted_as_in_a_recording(kind, tmp_path):
     own = scene(tmp_path, SAMPLES[kind](true(("study", 0.0))[0]))
-    found = findings_of(own)
+    found = input_findings_of(own)
     assert found and all({"spikes": "spike(s)", "clipped": "is clipped at"}[kind] in finding.text for finding in found)
-    assert not findings_of(scene(tmp_path, SAMPLES[kind](true(("study", 0.0))[0]), f'accept = ["{kind}"]\n'))
-    assert not findings_of(scene(tmp_path, true(("study", 0.0))[0]))
+    assert not input_findings_of(scene(tmp_path, SAMPLES[kind](true(("study", 0.0))[0]), f'accept = ["{kind}"]\n'))
+    assert not input_findings_of(scene(tmp_path, true(("study", 0.0))[0]))
 
 
 def test_a_file_that_is_far_too_short_may_be_in_seconds_under_milliseconds(tmp_path):
@@ -193,7 +195,7 @@ def test_a_file_that_is_far_too_short_may_be_in_seconds_under_milliseconds(tmp_p
     path = tmp_path / "f.csv"
     path.write_text(path.read_text().replace("time [s]", "time [ms]"))
     with pytest.raises(InputError, match=r"ends at 0\.02 s, but .* in seconds, not in milliseconds"):
-        findings_of(load_scene(str(tmp_path / "s.toml"), []))
+        input_findings_of(load_scene(str(tmp_path / "s.toml"), []))
 
 
 @pytest.mark.parametrize("late", [0.0, 0.05])
@@ -295,7 +297,7 @@ def test_a_whole_row_without_a_line_end_is_read_and_remarked_on(tmp_path):
     assert not has_line_end(path)
     values, _ = read_time_series(path, {"front": {"N": 1.0}, "rear": {"N": 1.0}})
     np.testing.assert_array_equal(values, forces)
-    notes = [finding for finding in findings_of(own) if finding.check == "file"]
+    notes = [finding for finding in input_findings_of(own) if finding.check == "file"]
     assert len(notes) == 1 and notes[0].weight == "note" and "no line end" in notes[0].text
 
 
@@ -321,12 +323,12 @@ TRUCKS = {
 def test_a_truck_that_no_one_builds_is_queried(change):
     """One of 10,000 t braked without a word."""
     own = load_scene("braking", [f"vehicle.override={{{change}}}"])
-    assert [finding.check for finding in findings_of(own)] == TRUCKS[change]
+    assert [finding.check for finding in input_findings_of(own)] == TRUCKS[change]
     accepted = load_scene("braking", [f"vehicle.override={{{change}}}", f"vehicle.accept={TRUCKS[change]}"])
-    assert not findings_of(accepted) and not findings_of(load_scene("braking", []))
+    assert not input_findings_of(accepted) and not input_findings_of(load_scene("braking", []))
 
 
 @pytest.mark.parametrize("radius, said", [(1e-4, 1), (2e-3, 0), (0.46, 0)])
 def test_a_contact_as_large_as_its_body_is_doubted(radius, said):
-    found = findings_of(load_scene("contact_ellipse", [f"radii.wheel_x={radius}"]))
+    found = input_findings_of(load_scene("contact_ellipse", [f"radii.wheel_x={radius}"]))
     assert ["radii.wheel_x" in finding.text and finding.weight for finding in found] == ["doubt"] * said

@@ -28,7 +28,7 @@ BOUND = 1e-3
 
 def plane(engine: str) -> tuple[Model, Trajectory]:
     raised = 1e-3 * np.array([1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0, 0.0])
-    model = in_plane(engine, setups.vehicle(initial=raised), Settings(RECOMMENDED[engine], STEP, STEPS * STEP))
+    model = in_plane(engine, setups.vehicle(start_state=raised), Settings(RECOMMENDED[engine], STEP, STEPS * STEP))
     return model, model.run()
 
 

@@ -15,8 +15,8 @@ from studies.command.asked import load_scene
 from studies.pictures import video
 from studies.pictures.camera import Camera, painted_picture
 from studies.pictures.drawing import arrow_lines, drawn_pose
-from studies.pictures.film import largest_differences
-from studies.pictures.page import Page
+from studies.pictures.film import largest_motion_differences
+from studies.pictures.page import FilmPage
 from studies.pictures.shapes import arrow, box
 
 TIMES = np.array([0.0, 0.02, 0.05])
@@ -31,7 +31,7 @@ def hunting():
 def test_both_engines_report_the_same_poses(vehicle, hunting):
     found = import_module(f"studies.pictures.{vehicle}")
     _, motions = hunting if vehicle == "wheelset" else found.stage_and_motions(0.05, TIMES, ("exudyn", "mujoco"))
-    places, rotations, _ = largest_differences(*motions)
+    places, rotations, _ = largest_motion_differences(*motions)
     assert places < 1e-9 and rotations < 1e-9
     for motion in motions:  # they move, and a hundred times further than that: the slowest on a road that fades in
         assert max(np.ptp(place, axis=0).max() for place in motion.positions.values()) > 1e-7
@@ -42,7 +42,7 @@ def test_both_engines_report_the_same_poses(vehicle, hunting):
 def test_a_difference_is_told(hunting):
     _, (one, two) = hunting
     moved = replace(two, positions={name: place + np.array([0.0, 1e-6, 0.0]) for name, place in two.positions.items()})
-    assert largest_differences(one, moved)[0] == pytest.approx(1e-6, rel=1e-6)
+    assert largest_motion_differences(one, moved)[0] == pytest.approx(1e-6, rel=1e-6)
 
 
 def test_arrows_are_as_long_as_their_forces(hunting):
@@ -86,25 +86,25 @@ def test_the_nearer_of_two_boxes_hides_the_other_one_and_lengths_are_those_of_th
     for order in ([red, blue.at(3.0, 0.0, 0.0)], [blue.at(3.0, 0.0, 0.0), red]):
         image = painted_picture(camera, [order], 80, 60, np.ones((2, 3)))
         assert image[30, 40, 2] > 0.2 > image[30, 40, 0]
-    (left, right), _ = camera.projected(np.array([[0.0, -0.5, 0.0], [0.0, 0.5, 0.0]]), 80, 60)
-    assert right[0] - left[0] == pytest.approx(camera.pixels(60)) and right[1] == left[1] == 30.0
+    (left, right), _ = camera.projected_points(np.array([[0.0, -0.5, 0.0], [0.0, 0.5, 0.0]]), 80, 60)
+    assert right[0] - left[0] == pytest.approx(camera.pixels_per_metre(60)) and right[1] == left[1] == 30.0
 
 
 def test_a_film_has_as_many_frames_as_its_duration_and_rate_say(hunting, tmp_path):
     scene = changed("film.duration=0.05", "film.slow_motion=4", "film.frames_per_second=30")
-    assert scene.film.frames == len(scene.film.times()) == 6  # 0.05 s x 4 x 30
-    np.testing.assert_allclose(np.diff(scene.film.times()), 1.0 / 120.0)
+    assert scene.film.frame_count == len(scene.film.frame_times()) == 6  # 0.05 s x 4 x 30
+    np.testing.assert_allclose(np.diff(scene.film.frame_times()), 1.0 / 120.0)
     if video.missing_extra("mp4"):
         pytest.skip(video.missing_extra("mp4"))
     import imageio_ffmpeg
 
-    frames = list(Page(*hunting).frames())
+    frames = list(FilmPage(*hunting).frames())
     assert frames[0].shape == (720, 1280, 3) and (frames[0] != frames[2]).any()
     for kind in hunting[
         0
     ].arrow_styles.values():  # the legend's arrow below the pictures, as long as its force is drawn
         shaft = np.isclose(frames[0][480:492], 255.0 * np.array(kind.colour), atol=1.0).all(axis=2).any(axis=0)
-        long = kind.scale * kind.legend * hunting[0].camera.pixels(400)
+        long = kind.scale * kind.legend * hunting[0].camera.pixels_per_metre(400)
         assert np.ptp(np.flatnonzero(shaft)) == pytest.approx(long, abs=5.0)  # its tip is blurred
     path = video.write(tmp_path / "film.mp4", frames * 2, 30)
     assert imageio_ffmpeg.count_frames_and_secs(str(path))[0] == 6

@@ -28,7 +28,7 @@ def stack(*calls):
         ([("run", "models/engines/exudyn.py"), ("_SolveDynamic", "exudyn/solver.py")], "marching in exudyn"),
         ([("run", "models/engines/exudyn.py"), ("force", "models/engines/exudyn.py")], "forces asked for by exudyn"),
         ([("__init__", "models/engines/free_vehicle_mujoco.py")], "building in mujoco"),
-        ([("run", "models/systems/braking/march.py")], profile.OUTSIDE_ENGINES),
+        ([("run", "models/systems/braking/march.py")], profile.OUTSIDE_ENGINES_KIND),
         ([("run", "models/systems/braking/march.py"), ("_moved", "models/engines/exudyn.py")], "marching in exudyn"),
         ([("run", "models/engines/exudyn.py"), ("compile", "numba/core/dispatcher.py")], profile.KERNELS_KIND),
         ([("compile", "numba/core/dispatcher.py"), ("<module>", "llvmlite/ir.py")], profile.IMPORTS_KIND),

@@ -180,12 +180,13 @@ def test_a_sweep_knows_its_scene_its_files_its_values_and_its_engine(tmp_path):
     (tmp_path / "cases.csv").write_text("1\n")
 
     def facts(**changes):
-        whole = {"scene": str(scene), "changes": (), "key": "k", "values": (1, 2), "engine": None, "folder": tmp_path}
-        return SweepJob(**whole | changes).facts()
+        whole = {"scene_name": str(scene), "key_changes": (), "swept_key": "k", "swept_values": (1, 2), "engine": None}
+        return SweepJob(**whole | {"output_folder": tmp_path} | changes).facts()
 
     first = facts()
-    assert facts(folder=Path("elsewhere")) == first
-    for change in ({"values": (1, 3)}, {"key": "j"}, {"engine": "exudyn"}, {"changes": ("contact.load=1",)}):
+    assert facts(output_folder=Path("elsewhere")) == first
+    changed = {"key_changes": ("contact.load=1",)}
+    for change in ({"swept_values": (1, 3)}, {"swept_key": "j"}, {"engine": "exudyn"}, changed):
         assert facts(**change) != first
     (tmp_path / "cases.csv").write_text("2\n")
     assert facts() != first

@@ -6,7 +6,7 @@ import pytest
 from models.core.errors import InputError, RunFailed
 from models.rail import equations as eq
 from models.rail.wheelset import CHOSEN_WHEELSET
-from validation.hard_cases.rolling import KINDS
+from validation.hard_cases.rolling import ENGINE_KINDS
 
 SPREAD = np.array([2e-3, 1e-4, 2e-4, 5e-3, 1.0, 0.05, 0.01, 0.05, 0.05, 1.0])
 SPREADABLE = (
@@ -67,16 +67,16 @@ def test_random_wheelsets_agree_or_fail_aloud(count):
     draw, done = np.random.default_rng(6), 0
     for i in range(count):
         given = drawn(draw)
-        ends = [end for kind in KINDS.values() if (end := ended(kind, *given)) is not None]
+        ends = [end for kind in ENGINE_KINDS.values() if (end := ended(kind, *given)) is not None]
         assert np.isfinite(ends).all(), i
-        assert len(ends) in (0, len(KINDS)), (i, given)
+        assert len(ends) in (0, len(ENGINE_KINDS)), (i, given)
         if not ends:
             continue
         done, (written, *engines) = done + 1, ends
         if (apart := np.ptp(engines, axis=0).max()) > SAME:
-            nudged = [ended(KINDS["reference"], *given, nudge=nudge) for nudge in (-NUDGE, NUDGE)]
+            nudged = [ended(ENGINE_KINDS["reference"], *given, nudge=nudge) for nudge in (-NUDGE, NUDGE)]
             assert apart < SENSITIVE * max(distance(end, written) for end in nudged), (i, given)
         if (apart := np.abs(written - engines[0]).max()) > SAME:
-            half = ended(KINDS["reference"], *given, parts=2)
+            half = ended(ENGINE_KINDS["reference"], *given, parts=2)
             assert apart < distance(half, written), (i, given)
     assert done > count / 3

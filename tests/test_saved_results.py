@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from models.core.result import load
-from studies.command.asked import SCENES_FOLDER, checked_study, engines_of, load_scene
+from studies.command.asked import SCENES_FOLDER, checked_study, load_scene, requested_engines
 from validation.replay.jobs import SHORT_RUN_SETTINGS
 
 LESS = tomllib.loads(SHORT_RUN_SETTINGS.read_text())
@@ -25,7 +25,7 @@ def saved_by_studies(name: str) -> list[Path]:
 
 def saved_by_short_run(scene: Any, folder: Path) -> list[Path]:
     """Results that the study of a scene leaves in a folder."""
-    engines = engines_of(getattr(getattr(scene, "run", None), "engine", None), scene.system)
+    engines = requested_engines(getattr(getattr(scene, "run", None), "engine", None), scene.system)
     checked_study(scene, engines).run(scene, engines, folder, lambda text, part: None)
     return sorted(folder.rglob("*.nc"))
 

@@ -55,7 +55,7 @@ def test_the_balance_sees_a_force_without_its_sign(monkeypatch):
     original = exudyn.ExudynModel._enforced
     monkeypatch.setattr(exudyn.ExudynModel, "_enforced", lambda self: original(self) * np.array([-1.0, 1.0]))
     with pytest.raises(RunFailed, match="of forces"):
-        hard._guided_run("exudyn", hard.guided_assembly(mass=0.95))
+        hard._guided_run("exudyn", hard.guided_assembly(mass_factor=0.95))
 
 
 def test_a_missing_projection_fails_its_row(monkeypatch, tmp_path):
@@ -84,7 +84,7 @@ def test_figure_draws_from_saved_data(measured):
 
 
 def test_exudyns_limit_stops_would_be_silent(monkeypatch, tmp_path):
-    monkeypatch.setattr(exudyn, "_add_pitch_spring", hard._limit_stop)
+    monkeypatch.setattr(exudyn, "_add_pitch_spring", hard._add_limit_stop)
     edge = next(one for one in hard.CASES if one.name == "edge of a dead band")
     assert judge(edge, "exudyn", tmp_path).word == "SILENT"
 

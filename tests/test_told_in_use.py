@@ -78,8 +78,8 @@ def test_a_sweep_tells_in_table_columns_json_and_code(tmp_path, monkeypatch, cap
     saved = json.loads((tmp_path / "a" / "sweep.json").read_text())["results"]
     estimates = saved[1]["errors"]["reference"]["channels"].values()
     assert float(broken["largest error [-]"]) == max(one["share"] for one in estimates)
-    quick = sweep.sweep_points("effects.road.speed=5,20", asked[0], (), "reference", error=False)
-    said = replace(quick, folder=tmp_path / "b").record(1)["results"]["reference"]
+    quick = sweep.sweep_points("effects.road.speed=5,20", asked[0], (), "reference", with_error=False)
+    said = replace(quick, output_folder=tmp_path / "b").record(1)["results"]["reference"]
     assert said["error"] == "{}" and "tyres press" in said["assumptions"]
 
 

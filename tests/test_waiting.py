@@ -14,7 +14,7 @@ from models.core.waiting import PROGRESS_FUNCTIONS, simulation_progress
 from models.engines.assembly import Settings
 from models.engines.protocol import build
 from models.systems.pitch_plane.scene import assembly_of_scene
-from studies.command.waiting import COMPILE_SECONDS, ProgressState
+from studies.command.waiting import COMPILE_SECONDS_OF_SYSTEM, ProgressState
 from validation.common.scenes import road_scene
 
 ROOT = Path(__file__).parents[1]
@@ -134,10 +134,10 @@ def test_time_left_follows_the_share_and_leaves_out_compiling(monkeypatch):
     shown.compilations._start()
     now[0] += 2.0
     text, share, left = shown.state()
-    assert text == "compiling kernels, once" and left == f"{COMPILE_SECONDS['pitch-plane'] - 2.0:.0f} s left"
-    assert share == pytest.approx(2.0 / COMPILE_SECONDS["pitch-plane"])
-    now[0] += 2.0 * COMPILE_SECONDS["pitch-plane"]
-    assert shown.state()[1:] == (None, f"{2.0 + 2.0 * COMPILE_SECONDS['pitch-plane']:.0f} s so far")
+    assert text == "compiling kernels, once" and left == f"{COMPILE_SECONDS_OF_SYSTEM['pitch-plane'] - 2.0:.0f} s left"
+    assert share == pytest.approx(2.0 / COMPILE_SECONDS_OF_SYSTEM["pitch-plane"])
+    now[0] += 2.0 * COMPILE_SECONDS_OF_SYSTEM["pitch-plane"]
+    assert shown.state()[1:] == (None, f"{2.0 + 2.0 * COMPILE_SECONDS_OF_SYSTEM['pitch-plane']:.0f} s so far")
     shown.compilations._end_compilation()
     assert shown.state() == ("six runs", 0.25, "30 s left")
     with simulation_progress(lambda: 0.5):

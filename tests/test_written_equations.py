@@ -16,7 +16,7 @@ from models.multibody.plain.road import control_value, surface
 from models.multibody.plain.rolling import Ledger, TyreReport
 from models.road.plane_waves import plane_waves
 from models.systems.handling.run import build_in_engine, run
-from studies.command.asked import SCENES_FOLDER, engines_of
+from studies.command.asked import SCENES_FOLDER, requested_engines
 from validation.faults.campaign import seeing_checks
 from validation.faults.written import CAMPAIGN
 from validation.spatial.cars import static_forces
@@ -87,12 +87,16 @@ def test_reports_have_the_columns_of_the_kernel():
 
 
 def test_engines_on_request_run_where_they_are_named():
-    assert engines_of("plain", "hub-forces") == ("plain",)
-    assert engines_of("reference", "handling") == ("reference",)
-    assert engines_of("all", "hub-forces") == engines_of(None, "hub-forces") == ("reference", "exudyn", "mujoco")
-    assert engines_of(None, "handling") == ("exudyn", "mujoco")
+    assert requested_engines("plain", "hub-forces") == ("plain",)
+    assert requested_engines("reference", "handling") == ("reference",)
+    assert (
+        requested_engines("all", "hub-forces")
+        == requested_engines(None, "hub-forces")
+        == ("reference", "exudyn", "mujoco")
+    )
+    assert requested_engines(None, "handling") == ("exudyn", "mujoco")
     with pytest.raises(InputError, match="no such engine"):
-        engines_of("plain", "handling")
+        requested_engines("plain", "handling")
 
 
 def test_a_scene_of_handling_runs_in_the_reference():

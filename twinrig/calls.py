@@ -66,7 +66,7 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
     """
     from models.core.finding import findings_as_dicts, merged_findings
     from models.systems import run as run_system
-    from studies.command.asked import findings_of, plan_of
+    from studies.command.asked import input_findings_of, plan_module_of
     from studies.command.waiting import progress_bar
     from twinrig.result import Result
 
@@ -75,8 +75,8 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
     _check_run_options(loaded, how, options)
     chosen, checked = _engines(loaded, engine, options["engine"].default == "")
     with _library_messages(loaded):
-        plan_of(loaded).check(loaded, checked)
-        doubtful = findings_as_dicts(merged_findings(findings_of(loaded)))
+        plan_module_of(loaded).check(loaded, checked)
+        doubtful = findings_as_dicts(merged_findings(input_findings_of(loaded)))
         with progress_bar(f"{loaded.title}: {chosen or loaded.system}", loaded.system):
             answer = run_system(loaded, chosen, error=error, **how)
     answer.data.attrs["queries"] = json.dumps(doubtful)
@@ -110,10 +110,10 @@ def _check_run_options(scene: Any, run_options: Mapping[str, Any], options: Mapp
 
 def _engines(scene: Any, requested_engine: str, optional: bool) -> tuple[str, tuple[str, ...]]:
     """The engine of a run ("" if the system chooses it), and the engines for which the scene is checked."""
-    from studies.command.asked import engines_of
+    from studies.command.asked import requested_engines
 
     named = requested_engine or getattr(getattr(scene, "run", None), "engine", None) or None
-    engines = engines_of(named, scene.system, "engine")
+    engines = requested_engines(named, scene.system, "engine")
     if requested_engine and len(engines) != 1:
         allowed = "a result is of one engine: run each, and lay two beside each other with twinrig.compare"
         raise InputError("engine", "", requested_engine, allowed, engines)
@@ -158,10 +158,10 @@ def compare(first: "Result | str | Path", second: "Result | str | Path", shift: 
     """Lay two results of the same kind beside each other, or a measurement over a result.
 
     Each is a result or the file of a saved result; ``second`` may be the file of a measurement, whose channels have the
-    names of the run's with units in brackets, as ``f1 [kN]``. The detail of two results is a list of ``Difference``,
-    those that differ most first: ``second`` less ``first``, with the place where it is largest and whether it lies
-    within the errors that both state. That of a measurement is an ``Overlay``: the time shift, and the error of every
-    channel.
+    names of the run's with units in brackets, as ``f1 [kN]``. The detail of two results is a list of
+    ``QuantityDifference``, those that differ most first: ``second`` less ``first``, with the place where it is largest
+    and whether it lies within the errors that both state. That of a measurement is a ``MeasurementOverlay``: the time
+    shift, and the error of every channel.
 
     shift : s, what the measurement's clock shows at the run's time 0; sought where None. Raises InputError for what has
     nothing in common.
@@ -176,7 +176,7 @@ def compare(first: "Result | str | Path", second: "Result | str | Path", shift: 
         laid = overlay_of_run(_loaded_result(first), second, shift)
         values = {
             "shift": laid.shift.seconds,
-            "channels": {compared.name: compared.values() for compared in laid.matches},
+            "channels": {compared.name: compared.errors_for_json() for compared in laid.matches},
         }
         return Report((f"{second} over {_result_name(first, 'the run')}", *laid.lines()), values, laid)
     if shift is not None:
@@ -225,13 +225,13 @@ def price(
     """
     from models.advice.price.recommendation import price as recommended
     from models.advice.price.text import as_dict, recommendation_lines
-    from studies.command.asked import engines_of
+    from studies.command.asked import requested_engines
     from studies.command.waiting import progress_bar
     from twinrig.report import Report
 
     loaded = load(scene, set).checked
     with _library_messages(loaded):
-        engines = engines_of(engine, loaded.system, "engine")
+        engines = requested_engines(engine, loaded.system, "engine")
         with progress_bar("runs of every engine in ever finer steps", loaded.system):
             answer = recommended(loaded, tolerance, _channels_in_words(quantity), engines)
     return Report(tuple(recommendation_lines(answer)), as_dict(answer), answer)
@@ -264,12 +264,12 @@ def choose(
     from tempfile import TemporaryDirectory
 
     from models.core.told import summary_with_errors
-    from studies.command.asked import checked_study, engines_of
+    from studies.command.asked import checked_study, requested_engines
     from studies.command.waiting import progress_bar
     from twinrig.report import Report
 
     loaded = _scene_for_choice(load(scene, set), quantities, tolerance).checked
-    engines = engines_of(engine, loaded.system, "engine")
+    engines = requested_engines(engine, loaded.system, "engine")
     with _library_messages(loaded), TemporaryDirectory() as temporary:
         study = checked_study(loaded, engines)
         result_folder = _new_folder(folder, "choice") if folder is not None else Path(temporary)

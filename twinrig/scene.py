@@ -44,9 +44,9 @@ class Scene:
 
     def plan(self) -> str:
         """Text on what the scene will compute: bodies, effects, channels, the model of each engine, and assumptions."""
-        from studies.command.asked import plan_of
+        from studies.command.asked import plan_module_of
 
-        return str(plan_of(self.checked).describe(self.checked))
+        return str(plan_module_of(self.checked).describe(self.checked))
 
     def __repr__(self) -> str:
         head = f"{self.title}\n  system {self.system}, scene {self.file}"

@@ -19,12 +19,12 @@ from models.measured.time_shift import ChannelPair, TimeShift, time_shift
 from models.measured.timing import sample_timing
 from models.measured.units import factor_between
 from studies.command.comparison import channels_of
-from studies.command.differences import Quantity
+from studies.command.differences import ResultQuantity
 
 TIME_AXIS = "time [s]"
 DOUBTFUL_CORRELATION = 0.5
 """Correlation of run and measurement below which a time shift is in doubt."""
-SHOWN_CHANNELS = 4
+SHOWN_CHANNEL_COUNT = 4
 """Number of channels in the figure, those with the largest relative errors."""
 TABLE_HEADINGS = ("channel", "unit", "rms error", "relative", "peak error", "at [s]", "stated error")
 
@@ -40,14 +40,14 @@ class ChannelComparison:
     name: str
     unit: str
     times: np.ndarray
-    run: np.ndarray
-    measured: np.ndarray
+    run_values: np.ndarray
+    measured_values: np.ndarray
     stated: float
 
     @property
     def error(self) -> np.ndarray:
         """Error (n,) of the channel: value of the run minus measured value."""
-        return self.run - self.measured
+        return self.run_values - self.measured_values
 
     @property
     def rms(self) -> float:
@@ -57,25 +57,25 @@ class ChannelComparison:
     @property
     def relative(self) -> float:
         """Rms error divided by the standard deviation of the measurement; infinite if the measurement is constant."""
-        size = float(np.std(self.measured))
+        size = float(np.std(self.measured_values))
         return self.rms / size if size > 0.0 else (0.0 if self.rms == 0.0 else np.inf)
 
     @property
-    def row(self) -> int:
+    def row_of_peak(self) -> int:
         """Index of the sample at which the channel's error is largest."""
         return int(np.abs(self.error).argmax())
 
     @property
     def peak(self) -> float:
         """Error of the largest magnitude, with its sign."""
-        return float(self.error[self.row])
+        return float(self.error[self.row_of_peak])
 
     @property
     def time_of_peak(self) -> float:
         """Time (s) of the run at which the channel's error is largest."""
-        return float(self.times[self.row])
+        return float(self.times[self.row_of_peak])
 
-    def values(self) -> dict[str, float | None]:
+    def errors_for_json(self) -> dict[str, float | None]:
         """Errors of the channel as plain values for JSON; None for numbers that are not finite."""
         plain = {
             "rms": self.rms,
@@ -88,7 +88,7 @@ class ChannelComparison:
 
 
 @dataclass(frozen=True)
-class Overlay:
+class MeasurementOverlay:
     """Comparison of a measurement with a run: the time shift, the common channels, and notes on channels that could not
     be compared."""
 
@@ -121,30 +121,32 @@ class Overlay:
         return f"time shift {shift:.6g} s, by which the measurement is later (correlation {correlation:.4f}){doubt}"
 
 
-def _share_text(relative: float) -> str:
+def _share_text(relative_error: float) -> str:
     """Text of a relative error in per cent; "-" if it is not finite, as for a constant measurement."""
-    return f"{100.0 * relative:.3g} %" if np.isfinite(relative) else "-"
+    return f"{100.0 * relative_error:.3g} %" if np.isfinite(relative_error) else "-"
 
 
-def _within_error_text(channel_match: ChannelComparison) -> str:
+def _within_error_text(channel_comparison: ChannelComparison) -> str:
     return (
-        f"; rms within the run's own error of {channel_match.stated:.2g}"
-        if channel_match.rms <= channel_match.stated
+        f"; rms within the run's own error of {channel_comparison.stated:.2g}"
+        if channel_comparison.rms <= channel_comparison.stated
         else ""
     )
 
 
-def is_run_against_measurement(run: Path, measurement: Path) -> bool:
+def is_run_against_measurement(run_path: Path, measurement_path: Path) -> bool:
     """Whether the two paths are a run (a saved result or a folder) and a file of measurements, in this order."""
     return (
-        (run.is_dir() or run.suffix == ".nc")
-        and not measurement.is_dir()
-        and measurement.suffix != ".nc"
-        and is_measurement(measurement)
+        (run_path.is_dir() or run_path.suffix == ".nc")
+        and not measurement_path.is_dir()
+        and measurement_path.suffix != ".nc"
+        and is_measurement(measurement_path)
     )
 
 
-def overlay_of_run(run: Result, file: str | Path, time_shift_seconds: float | None = None) -> Overlay:
+def overlay_of_run(
+    saved_run: Result, measurement_path: str | Path, time_shift_seconds: float | None = None
+) -> MeasurementOverlay:
     """Compare a measurement with a run channel by channel, largest relative error first.
 
     Headers are ``name [unit]``, names those of the run's channels; units are converted. A run of several engines has a
@@ -153,31 +155,39 @@ def overlay_of_run(run: Result, file: str | Path, time_shift_seconds: float | No
     """
     timed = (
         (name, quantity)
-        for name, quantity in channels_of(run.data)
-        if quantity.over == TIME_AXIS and len(quantity.grid) > 3
+        for name, quantity in channels_of(saved_run.data)
+        if quantity.grid_name == TIME_AXIS and len(quantity.grid) > 3
     )
     ours = {name: quantity for name, quantity in timed if np.isfinite(quantity.values).all()}
     if not ours:
         raise InputError("compare", "", None, "the run has no channels over time: a measurement cannot lie over it")
-    source = open_source(file)
-    engines = [str(engine) for engine in run.data.coords["engine"].values] if "engine" in run.data.coords else []
-    named = {name: channel for channel in source.channels for name in _channels_by_engine(channel.name, engines, ours)}
+    source = open_source(measurement_path)
+    engines = (
+        [str(engine) for engine in saved_run.data.coords["engine"].values] if "engine" in saved_run.data.coords else []
+    )
+    named = {
+        name: channel for channel in source.channels for name in _matching_run_channels(channel.name, engines, ours)
+    }
     if not named:
         theirs = [channel.name for channel in source.channels]
         name = next((other for other in theirs if suggestion_phrase(other, tuple(ours))), theirs[0] if theirs else None)
-        raise InputError(file, "", name, "no channel has the name of one of the run", tuple(ours))
+        raise InputError(measurement_path, "", name, "no channel has the name of one of the run", tuple(ours))
     doubts = list[str]()
     pairs = {name: _channel_pair(source, channel, ours[name], doubts) for name, channel in named.items()}
     moved_by = time_shift(list(pairs.values())) if time_shift_seconds is None else TimeShift(time_shift_seconds, np.nan)
-    matches = [_channel_match(name, pair, ours[name].unit, moved_by.seconds, run) for name, pair in pairs.items()]
+    matches = [
+        _compared_channel(name, pair, ours[name].unit, moved_by.seconds, saved_run) for name, pair in pairs.items()
+    ]
     complete = [match for match in matches if match is not None]
     if not complete:
-        raise InputError(file, "time", moved_by.seconds, "at this time shift (s) no sample lies within the run")
+        raise InputError(
+            measurement_path, "time", moved_by.seconds, "at this time shift (s) no sample lies within the run"
+        )
     notes = [*_missing_channel_notes(source, ours, engines), *dict.fromkeys(doubts)]
-    return Overlay(moved_by, sorted(complete, key=lambda channel_match: -channel_match.relative), notes)
+    return MeasurementOverlay(moved_by, sorted(complete, key=lambda channel_match: -channel_match.relative), notes)
 
 
-def _channels_by_engine(name: str, engines: list[str], run_quantities: Mapping[str, Quantity]) -> list[str]:
+def _matching_run_channels(name: str, engines: list[str], run_quantities: Mapping[str, ResultQuantity]) -> list[str]:
     """Names of the run's channels to compare with a measured channel: its own name, or this name followed by the name
     of an engine."""
     if name in run_quantities:
@@ -188,11 +198,11 @@ def _channels_by_engine(name: str, engines: list[str], run_quantities: Mapping[s
 
 
 def _missing_channel_notes(
-    measurement_source: MeasurementSource, run_quantities: Mapping[str, Quantity], engines: list[str]
+    measurement_source: MeasurementSource, run_quantities: Mapping[str, ResultQuantity], engines: list[str]
 ) -> Iterator[str]:
     """Yield a note on each measured channel that the run does not have, with the most similar name of the run."""
     for channel in measurement_source.channels:
-        if not _channels_by_engine(channel.name, engines, run_quantities):
+        if not _matching_run_channels(channel.name, engines, run_quantities):
             yield (
                 f"not compared: {channel.name!r} is no channel of the "
                 f"run{suggestion_phrase(channel.name, tuple(run_quantities))}"
@@ -200,22 +210,27 @@ def _missing_channel_notes(
 
 
 def _channel_pair(
-    measurement_source: MeasurementSource, channel: FileChannel, run_quantity: Quantity, doubts: list[str]
+    measurement_source: MeasurementSource,
+    measured_channel: FileChannel,
+    run_quantity: ResultQuantity,
+    doubts: list[str],
 ) -> ChannelPair:
     """Times and values of a channel in the run and in the measurement, both in the run's unit; doubts about the
     measured times are appended to ``doubts``.
     """
-    if not channel.unit and run_quantity.unit not in ("", "-"):
-        allowed = f"has no unit: write {channel.name} [{run_quantity.unit}] in the header, or its unit there"
-        raise InputError(measurement_source.path, channel.name, None, allowed)
-    factor = factor_between(channel.unit, run_quantity.unit, measurement_source.path, channel.name)
-    blocks = list(measurement_source.blocks([channel.name]))
+    if not measured_channel.unit and run_quantity.unit not in ("", "-"):
+        allowed = f"has no unit: write {measured_channel.name} [{run_quantity.unit}] in the header, or its unit there"
+        raise InputError(measurement_source.path, measured_channel.name, None, allowed)
+    factor = factor_between(measured_channel.unit, run_quantity.unit, measurement_source.path, measured_channel.name)
+    blocks = list(measurement_source.blocks([measured_channel.name]))
     sample_times, values = (
         np.concatenate(parts) for parts in zip(*((b.times, b.values[:, 0]) for b in blocks), strict=True)
     )
     if not np.isfinite(values).any():
-        raise InputError(measurement_source.path, channel.name, None, "has no values: no cell of it holds a number")
-    clock = sample_timing(sample_times, str(measurement_source.path), (channel.name,))
+        raise InputError(
+            measurement_source.path, measured_channel.name, None, "has no values: no cell of it holds a number"
+        )
+    clock = sample_timing(sample_times, str(measurement_source.path), (measured_channel.name,))
     doubts.extend(finding.text for finding in clock.findings)
     return ChannelPair(
         run_quantity.grid,
@@ -225,8 +240,8 @@ def _channel_pair(
     )
 
 
-def _channel_match(
-    name: str, channel_pair: ChannelPair, unit: str, time_shift_seconds: float, run: Result
+def _compared_channel(
+    channel_name: str, channel_pair: ChannelPair, channel_unit: str, time_shift_seconds: float, saved_run: Result
 ) -> ChannelComparison | None:
     """Comparison of a channel at the measured times within the run, at which the run is interpolated by a cubic spline;
     None if no measured time lies within it."""
@@ -242,10 +257,10 @@ def _channel_match(
     if not is_within.any():
         return None
     read = CubicSpline(channel_pair.run_times, channel_pair.run_values)(times[is_within])
-    stated = errors_of(run).get(name.partition(", ")[0])
+    stated = errors_of(saved_run).get(channel_name.partition(", ")[0])
     return ChannelComparison(
-        name,
-        unit,
+        channel_name,
+        channel_unit,
         times[is_within],
         read,
         channel_pair.measured_values[is_within],
@@ -253,23 +268,25 @@ def _channel_match(
     )
 
 
-def saved_results(file_or_folder: Path) -> dict[str, Result]:
+def saved_results(result_path: Path) -> dict[str, Result]:
     """All saved results in a file or folder, by the name of the file; raises InputError if there are none."""
-    if not file_or_folder.exists():
-        raise InputError(file_or_folder, "", None, "no such file or folder")
-    files = [file_or_folder] if file_or_folder.is_file() else sorted(file_or_folder.rglob("*.nc"))
+    if not result_path.exists():
+        raise InputError(result_path, "", None, "no such file or folder")
+    files = [result_path] if result_path.is_file() else sorted(result_path.rglob("*.nc"))
     if not files:
-        raise InputError(file_or_folder, "", None, "holds no saved result (.nc): name the folder of a run")
+        raise InputError(result_path, "", None, "holds no saved result (.nc): name the folder of a run")
     return {file.stem: load(file) for file in files}
 
 
-def report(run_path: Path, measurement: Path, folder: Path, time_shift_seconds: float | None = None) -> dict[str, Any]:
+def report(
+    run_path: Path, measurement_path: Path, output_folder: Path, time_shift_seconds: float | None = None
+) -> dict[str, Any]:
     """Compare a measurement with a run, or with all runs in a folder; saves ``compare.csv`` and figures, and returns
     the summary."""
     overlays = {
-        name: overlay_of_run(run, measurement, time_shift_seconds) for name, run in saved_results(run_path).items()
+        name: overlay_of_run(run, measurement_path, time_shift_seconds) for name, run in saved_results(run_path).items()
     }
-    with whole_file(folder / "compare.csv") as partial_path, partial_path.open("w", newline="") as file:
+    with whole_file(output_folder / "compare.csv") as partial_path, partial_path.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(("run", *TABLE_HEADINGS))
         for name, overlay in overlays.items():
@@ -278,38 +295,38 @@ def report(run_path: Path, measurement: Path, folder: Path, time_shift_seconds: 
     for name, overlay in overlays.items():
         draw_overlay(
             overlay,
-            f"{measurement.name} over {name}",
-            folder / (f"compare_{name}.png" if len(overlays) > 1 else "compare.png"),
+            f"{measurement_path.name} over {name}",
+            output_folder / (f"compare_{name}.png" if len(overlays) > 1 else "compare.png"),
         )
     table = [line for name, overlay in overlays.items() for line in _overlay_lines(name, overlay, len(overlays))]
     return {
-        "scene": f"{measurement} over {run_path}",
-        "folder": str(folder),
+        "scene": f"{measurement_path} over {run_path}",
+        "folder": str(output_folder),
         "failed": {},
         "shift": {name: overlay.shift.seconds for name, overlay in overlays.items()},
         "errors of channels": {
-            name: {m.name: m.values() for m in overlay.matches} for name, overlay in overlays.items()
+            name: {m.name: m.errors_for_json() for m in overlay.matches} for name, overlay in overlays.items()
         },
         "table": table,
         "results": {},
     }
 
 
-def _overlay_lines(name: str, overlay: Overlay, overlay_count: int) -> Sequence[str]:
-    return [*([f"  {name}"] if overlay_count > 1 else []), *overlay.lines()]
+def _overlay_lines(run_name: str, measurement_overlay: MeasurementOverlay, overlay_count: int) -> Sequence[str]:
+    return [*([f"  {run_name}"] if overlay_count > 1 else []), *measurement_overlay.lines()]
 
 
-def draw_overlay(overlay: Overlay, title: str, path: Path) -> None:
+def draw_overlay(measurement_overlay: MeasurementOverlay, title: str, figure_path: Path) -> None:
     """Save a figure of the channels with the largest relative errors: measurement and run, and below it their
     difference."""
     from models.drawing.figures import BLUE, DARK, VERMILION, add_heading, save, subplots
 
-    shown = overlay.matches[:SHOWN_CHANNELS]
+    shown = measurement_overlay.matches[:SHOWN_CHANNEL_COUNT]
     figure, axes = subplots(2, len(shown), figsize=(3.6 * len(shown) + 1.0, 5.4), sharex="col", squeeze=False)
     for (top, error_axis), match in zip(axes.T, shown, strict=True):
         unit = match.unit or "-"
-        top.plot(match.times, match.measured, color=DARK, linewidth=1.8, label="measured")
-        top.plot(match.times, match.run, color=VERMILION, linewidth=1.0, label="run")
+        top.plot(match.times, match.measured_values, color=DARK, linewidth=1.8, label="measured")
+        top.plot(match.times, match.run_values, color=VERMILION, linewidth=1.0, label="run")
         top.set(title=match.name, ylabel=f"{match.name} [{unit}]")
         error_axis.plot(match.times, match.error, color=BLUE)
         error_axis.plot(match.time_of_peak, match.peak, "o", color=BLUE, markersize=5)
@@ -319,5 +336,5 @@ def draw_overlay(overlay: Overlay, title: str, path: Path) -> None:
         )
         error_axis.set_ylabel(f"run less measurement [{unit}]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    add_heading(figure, f"{title}: {overlay.shift_sentence().partition(';')[0]}", {})
-    save(figure, path)
+    add_heading(figure, f"{title}: {measurement_overlay.shift_sentence().partition(';')[0]}", {})
+    save(figure, figure_path)

@@ -24,44 +24,44 @@ ANY_SYSTEM = "any"
 
 @cache
 def study_names() -> tuple[str, ...]:
-    """Names of all studies: files of the studies' folder that define ``run(scene, engines, folder, progress)``; they
-    are read, not imported."""
+    """Names of all studies: files of the studies' folder that define ``run(scene, engines, output_folder,
+    report_progress)``; they are read, not imported."""
     files = sorted(STUDIES_FOLDER.glob("*.py"))
     return tuple(file.stem for file in files if re.search(r"^def run\(\s*scene", file.read_text(), re.MULTILINE))
 
 
-def load_scene(name: str, changes: list[str] | None) -> Any:
+def load_scene(scene_name: str, key_changes: list[str] | None) -> Any:
     """Load a scene, with changes KEY=VALUE, by the name of a shipped scene or from a file whose name ends in .toml."""
-    return load(scene_path(name), changes or (), KNOWN_SYSTEMS)
+    return load(scene_path(scene_name), key_changes or (), KNOWN_SYSTEMS)
 
 
-def scene_path(name: str) -> Path:
+def scene_path(scene_name: str) -> Path:
     """Path of a scene's file, by the name of a shipped scene or of a file; raises InputError if there is none."""
     names = tuple(sorted(path.stem for path in SCENES_FOLDER.glob("*.toml")))
-    if name in names:
-        return SCENES_FOLDER / f"{name}.toml"
-    if not name.endswith(".toml") and not os.path.lexists(name):
-        raise InputError("", "scene", name, "no such scene, and no such file", names)
-    if is_measurement(Path(name)):
+    if scene_name in names:
+        return SCENES_FOLDER / f"{scene_name}.toml"
+    if not scene_name.endswith(".toml") and not os.path.lexists(scene_name):
+        raise InputError("", "scene", scene_name, "no such scene, and no such file", names)
+    if is_measurement(Path(scene_name)):
         raise InputError(
-            name,
+            scene_name,
             "",
             None,
-            f"this is no scene: `twinrig show {name}` says what is in a measurement and prints a scene for it",
+            f"this is no scene: `twinrig show {scene_name}` says what is in a measurement and prints a scene for it",
         )
-    return Path(name)
+    return Path(scene_name)
 
 
 def checked_study(scene: Any, engines: tuple[str, ...]) -> Any:
     """The module of a scene's study, after all checks that are possible before a run; raises InputError."""
-    module = study_of(scene)
-    plan_of(scene).check(scene, engines)
+    module = study_module_of(scene)
+    plan_module_of(scene).check(scene, engines)
     if hasattr(module, "check"):
         module.check(scene, engines)
     return module
 
 
-def check_by_any(scene: Any, engines: tuple[str, ...]) -> None:
+def check_for_any_engine(scene: Any, engines: tuple[str, ...]) -> None:
     """Raise InputError if no engine can run the scene. If only some engines refuse it, nothing is raised."""
     try:
         checked_study(scene, engines)
@@ -78,21 +78,21 @@ def _is_runnable(scene: Any, engine: str) -> bool:
     return True
 
 
-def needs_no_extras(scene: Any, engines: tuple[str, ...], module: Any) -> bool:
+def runs_without_extras(scene: Any, engines: tuple[str, ...], study_module: Any) -> bool:
     """Whether a study runs without workers, unit conversion and code of the user."""
-    code = getattr(plan_of(scene), "user_code", lambda scene: "")(scene)
-    shared = hasattr(module, "BLOCKS_FOLDER") or scene.system == "measured"
+    code = getattr(plan_module_of(scene), "user_code", lambda scene: "")(scene)
+    shared = hasattr(study_module, "BLOCKS_FOLDER") or scene.system == "measured"
     return not (code or shared or any(":" in engine for engine in engines))
 
 
-def plan_of(scene: Any) -> Any:
+def plan_module_of(scene: Any) -> Any:
     """The module that describes and checks the scenes of the scene's system."""
     return import_module(KNOWN_SYSTEMS[scene.system].plan)
 
 
-def findings_of(scene: Any) -> tuple[Finding, ...]:
+def input_findings_of(scene: Any) -> tuple[Finding, ...]:
     """Findings of doubtful input of a scene, before any run; raises InputError for impossible input."""
-    look = getattr(plan_of(scene), "findings", None)
+    look = getattr(plan_module_of(scene), "findings", None)
     unended = (
         () if scene.system == "measured" else _unfinished_file_notes(scene)
     )  # whose files are remarked on as recordings
@@ -105,7 +105,7 @@ def doubt_lines(scene: Any) -> list[str]:
 
     checks = (*get_args(Query), "exchanged", "shift")
     with suppress(InputError):
-        return finding_lines(finding for finding in findings_of(scene) if finding.check in checks)
+        return finding_lines(finding for finding in input_findings_of(scene) if finding.check in checks)
     return []
 
 
@@ -127,42 +127,46 @@ def _unfinished_file_notes(scene: Any) -> Iterator[Finding]:
             )
 
 
-def _csv_files_of_table(table: Any) -> Iterator[str]:
+def _csv_files_of_table(scene_table: Any) -> Iterator[str]:
     """Yield the names of CSV files anywhere in nested tables."""
-    if isinstance(table, dict | list):
-        for value in table.values() if isinstance(table, dict) else table:
+    if isinstance(scene_table, dict | list):
+        for value in scene_table.values() if isinstance(scene_table, dict) else scene_table:
             yield from _csv_files_of_table(value)
-    elif isinstance(table, str) and table.lower().endswith(".csv"):
-        yield table
+    elif isinstance(scene_table, str) and scene_table.lower().endswith(".csv"):
+        yield scene_table
 
 
-def engines_of(name: str | None, system: str, option: str = "--engine") -> tuple[str, ...]:
-    """The engines for a value of ``--engine`` and a system; none for a system without engines. option : the name of the
+def requested_engines(engine_option: str | None, system_name: str, option_name: str = "--engine") -> tuple[str, ...]:
+    """The engines for a value of ``--engine`` and a system; none for a system without engines. option_name : of the
     option, for messages."""
-    engines = KNOWN_SYSTEMS[system].engines
-    if name not in (None, "all") and not engines:
-        raise InputError(option, "", name, f"has no meaning for {system}, which no engine computes: leave it out")
-    if name is None or name == "all":
+    engines = KNOWN_SYSTEMS[system_name].engines
+    if engine_option not in (None, "all") and not engines:
+        raise InputError(
+            option_name, "", engine_option, f"has no meaning for {system_name}, which no engine computes: leave it out"
+        )
+    if engine_option is None or engine_option == "all":
         return engines
-    if ":" in name:
-        return _registered_outside(name, system, option)
-    named = (*engines, *KNOWN_SYSTEMS[system].on_request)
-    if name not in named:
-        raise InputError(option, "", name, "no such engine", (*named, "all"))
-    return (name,)
+    if ":" in engine_option:
+        return _register_user_engine(engine_option, system_name, option_name)
+    named = (*engines, *KNOWN_SYSTEMS[system_name].on_request)
+    if engine_option not in named:
+        raise InputError(option_name, "", engine_option, "no such engine", (*named, "all"))
+    return (engine_option,)
 
 
-def _registered_outside(name: str, system: str, option: str) -> tuple[str, ...]:
+def _register_user_engine(class_path: str, system_name: str, option_name: str) -> tuple[str, ...]:
     """Register an engine or integrator of the user, ``module:Class``; returns its name."""
-    if system != DEFAULT_SYSTEM:
-        raise InputError(option, "", name, f"can run scenes of {DEFAULT_SYSTEM} only, and this one is of {system}")
+    if system_name != DEFAULT_SYSTEM:
+        raise InputError(
+            option_name, "", class_path, f"can run scenes of {DEFAULT_SYSTEM} only, and this one is of {system_name}"
+        )
     from models.engines.outside import register
 
-    register(name)
-    return (name,)
+    register(class_path)
+    return (class_path,)
 
 
-def study_of(scene: Any) -> Any:
+def study_module_of(scene: Any) -> Any:
     """The module of a scene's study; raises InputError for an unknown study, another system, and options that the study
     does not have."""
     from models.core.strict import read

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from models.core.errors import InputError
-from studies.command.finishing import exit_with_message, folder_of
+from studies.command.finishing import exit_with_message, results_folder_of
 from studies.command.waiting import progress_bar
 
 
@@ -23,7 +23,10 @@ def conformity_report(engine: str, has_other_options: bool, requested_folder: Pa
 
 
 def blind_spot_audit(
-    has_other_options: bool, function_pattern: str | None, requested_folder: Path | None, resume: Path | None
+    has_other_options: bool,
+    function_pattern: str | None,
+    requested_folder: Path | None,
+    interrupted_folder: Path | None,
 ) -> None:
     """Audit which rows and tests detect faults in shared functions, all or those that match ``function_pattern``;
     raises InputError for options of a report."""
@@ -32,7 +35,7 @@ def blind_spot_audit(
     from validation.blind_spots.audit import TRACE, audit, audit_of, audit_summary
 
     command = "twinrig validate --blind-spots" + ("" if function_pattern is None else f" --only '{function_pattern}'")
-    folder = folder_of("blind-spots", TRACE, "", requested_folder, resume)
+    folder = results_folder_of("blind-spots", TRACE, "", requested_folder, interrupted_folder)
     try:
         with progress_bar("blind spots") as progress:
             lines = (

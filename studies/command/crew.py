@@ -8,17 +8,17 @@ if TYPE_CHECKING:  # the command line imports this file before it knows whether 
     from models.ensemble.workers import Crew
 
 
-def crew_changes_by_options(workers: int | None, cluster: str | None) -> dict[str, Any]:
+def crew_changes_by_options(worker_count: int | None, cluster_address: str | None) -> dict[str, Any]:
     """Changes of a scene's keys "workers" and "cluster" by the options; raises InputError if both options are given."""
-    if workers is not None and cluster is not None:
+    if worker_count is not None and cluster_address is not None:
         allowed = "is for this machine, and the workers of a cluster are those that have joined it: leave one out"
-        raise InputError("--workers", "", workers, allowed)
-    crew_changes = {"workers": workers, "cluster": cluster}
-    return {} if workers is None and cluster is None else crew_changes
+        raise InputError("--workers", "", worker_count, allowed)
+    crew_changes = {"workers": worker_count, "cluster": cluster_address}
+    return {} if worker_count is None and cluster_address is None else crew_changes
 
 
-def crew_of(scene: Any, workers: int | None, cluster: str | None) -> "Crew":
+def crew_of(scene: Any, worker_count: int | None, cluster_address: str | None) -> "Crew":
     """The workers of a scene, with the options ``--workers`` and ``--cluster`` in place of the scene's keys."""
     from models.ensemble.workers import Crew
 
-    return Crew.of(scene.model_copy(update=crew_changes_by_options(workers, cluster)))
+    return Crew.of(scene.model_copy(update=crew_changes_by_options(worker_count, cluster_address)))

@@ -11,7 +11,7 @@ from models.core.whole_files import write_whole
 from models.engines.export import SUFFIXES, Exported
 
 
-def exported_text(scene: Any, engine: str) -> Exported:
+def exported_vehicle(scene: Any, engine: str) -> Exported:
     """Export of a scene's vehicle: text of the file, and lists of its contents and omissions. Raises InputError for an
     engine without a file format and for a system without an exportable vehicle."""
     if engine not in SUFFIXES:
@@ -28,7 +28,7 @@ def _exportable_systems() -> tuple[str, ...]:
     return tuple(name for name, system in SYSTEMS.items() if find_spec(f"{system.package}.export"))
 
 
-def target_file(scene: Any, engine: str, output_path: Path | None) -> Path:
+def exported_file_path(scene: Any, engine: str, output_path: Path | None) -> Path:
     """Path of the exported file; raises InputError if it exists, has the wrong extension, or its folder does not
     exist."""
     suffix = SUFFIXES.get(engine, "")
@@ -45,15 +45,21 @@ def target_file(scene: Any, engine: str, output_path: Path | None) -> Path:
 def export(scene: Any, engine: str, output_path: Path | None) -> dict[str, Any]:
     """Write the exported file of a scene's vehicle; returns its path ("file"), and sentences on its contents ("has")
     and omissions ("left out")."""
-    answer = exported_text(scene, engine)
-    path = target_file(scene, engine, output_path)
+    answer = exported_vehicle(scene, engine)
+    path = exported_file_path(scene, engine, output_path)
     write_whole(path, answer.text)
     return {"file": str(path), "has": [*answer.has], "left out": [*answer.left_out]}
 
 
-def export_lines(title: str, export_record: dict[str, Any]) -> list[str]:
+def export_lines(scene_title: str, export_record: dict[str, Any]) -> list[str]:
     """Lines for the screen: the scene's title, and the contents and omissions of the exported file."""
     path, left_out = export_record["file"], [f"    {text}" for text in export_record["left out"]]
     head = "  left out:" if left_out else "  leaves nothing out"
     opened = f"python -m mujoco.viewer --mjcf={path}" if path.endswith(SUFFIXES["mujoco"]) else f"python {path}"
-    return [f"{title}: {path}", f"  has {', '.join(export_record['has'])}", head, *left_out, f"  open it: {opened}"]
+    return [
+        f"{scene_title}: {path}",
+        f"  has {', '.join(export_record['has'])}",
+        head,
+        *left_out,
+        f"  open it: {opened}",
+    ]

@@ -16,17 +16,17 @@ StudyRun = Callable[[Any], dict[str, Any]]
 """Function that runs a study: its argument reports progress, and it returns the summary."""
 
 
-def exit_with_message(message: str, code: int) -> NoReturn:
+def exit_with_message(message: str, exit_code: int) -> NoReturn:
     """End the process with a message on stderr and an exit code: 1 for a failed run, 2 for a user's mistake, 130 for
     Ctrl-C."""
     print(f"twinrig: {message}", file=sys.stderr)
-    sys.exit(code)
+    sys.exit(exit_code)
 
 
-def profiled_work(profile: bool) -> Callable[[StudyRun], StudyRun]:
-    """Wrapper for the function that runs a study: with ``profile``, its summary also states where computing time was
-    spent; without, the function is unchanged."""
-    if not profile:
+def profiling_wrapper(is_profiled: bool) -> Callable[[StudyRun], StudyRun]:
+    """Wrapper for the function that runs a study: with ``is_profiled``, its summary also states where computing time
+    was spent; without, the function is unchanged."""
+    if not is_profiled:
         return lambda work: work
     from studies.command.profile import Profiler
 
@@ -34,54 +34,62 @@ def profiled_work(profile: bool) -> Callable[[StudyRun], StudyRun]:
     return lambda work: partial(profiler.run_profiled, work)
 
 
-def finish(
-    work: StudyRun,
-    folder: Path,
+def run_and_print_summary(
+    run_study: StudyRun,
+    output_folder: Path,
     as_json: bool,
     doubts: tuple[Finding, ...] = (),
-    strict: bool = False,
-    system: str = "",
+    is_strict: bool = False,
+    system_name: str = "",
 ) -> None:
-    """Run a study, whose results are saved in ``folder``, with a progress bar, and print its summary.
+    """Run a study, whose results are saved in ``output_folder``, with a progress bar, and print its summary.
 
-    doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results; strict : whether
-    a broken assumption ends with code 1; system : of the scene.
+    doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results; is_strict :
+    whether a broken assumption ends with code 1; system_name : of the scene.
     """
     from models.core.result_folders import COMMAND_FILE, drop_if_empty
     from models.core.told import summary_with_errors
 
     try:
-        with progress_bar(folder.name, system) as progress:
-            summary = summary_with_errors(work(progress))
+        with progress_bar(output_folder.name, system_name) as progress:
+            summary = summary_with_errors(run_study(progress))
         if doubts:
             summary["queries"] = findings_as_dicts(doubts)
-            write_whole(folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
+            write_whole(output_folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
     except KeyboardInterrupt:
-        has_results = {path.name for path in folder.iterdir()} - {COMMAND_FILE}
-        exit_with_message(
-            f"interrupted; {f'finished results are kept in {folder}' if has_results else 'nothing was finished'}", 130
-        )
+        has_results = {path.name for path in output_folder.iterdir()} - {COMMAND_FILE}
+        outcome = f"finished results are kept in {output_folder}" if has_results else "nothing was finished"
+        exit_with_message(f"interrupted; {outcome}", 130)
     finally:
-        drop_if_empty(folder)
+        drop_if_empty(output_folder)
     if as_json:
         print(json.dumps(summary, indent=1))
     else:
         _print_summary(summary, doubts)
-    if summary.get("failed") or (strict and any(judged["broken"] for judged in summary["assumptions"].values())):
+    if summary.get("failed") or (is_strict and any(judged["broken"] for judged in summary["assumptions"].values())):
         sys.exit(1)
 
 
-def folder_of(name: str, blocks: str | None, study: str, output_folder: Path | None, resume: Path | None) -> Path:
-    """Folder for the results: a new folder, or the folder of an interrupted run, with finished parts in ``blocks``."""
+def results_folder_of(
+    scene_name: str,
+    blocks_folder: str | None,
+    study_name: str,
+    output_folder: Path | None,
+    interrupted_folder: Path | None,
+) -> Path:
+    """Folder for the results: a new folder, or the folder of an interrupted run, with finished parts in
+    ``blocks_folder``."""
     from models.core.result_folders import new_folder, resumed_folder
 
-    if resume is None:
-        return new_folder(output_folder, name)
+    if interrupted_folder is None:
+        return new_folder(output_folder, scene_name)
     if output_folder is not None:
-        raise InputError("--resume", "", str(resume), "goes on in its own folder: leave out --out")
-    if blocks is None:
-        raise InputError("--resume", "", str(resume), f"the study {study!r} keeps nothing that can be resumed")
-    return resumed_folder(resume, blocks)
+        raise InputError("--resume", "", str(interrupted_folder), "goes on in its own folder: leave out --out")
+    if blocks_folder is None:
+        raise InputError(
+            "--resume", "", str(interrupted_folder), f"the study {study_name!r} keeps nothing that can be resumed"
+        )
+    return resumed_folder(interrupted_folder, blocks_folder)
 
 
 def unprinted_finding_lines(findings: tuple[Finding, ...], printed_text: str) -> list[str]:

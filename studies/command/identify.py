@@ -29,39 +29,41 @@ ReportProgress = Callable[[str, float], None]
 
 def identify(
     scene: Any,
-    measurement: str | Path,
-    parameters: Sequence[str],
+    measurement_path: str | Path,
+    scene_keys: Sequence[str],
     *,
     engine: str = "",
     low_pass: float = 0.0,
-    folder: Path | None = None,
+    stages_folder: Path | None = None,
     report_progress: ReportProgress = lambda text, share: None,
 ) -> Uncertainty:
     """Estimates of a scene's keys from a measurement, with their uncertainty; the run must have channels over time.
 
-    scene : as ``load_scene`` gives it; measurement : its channels have the names of the run's; parameters : KEY or
-    KEY=LOW:HIGH; engine : "" for the usual one; low_pass : Hz, on both, 0 for none; folder : keeps finished stages.
-    The scene's crew computes the columns of Jacobians. Raises InputError and RunFailed.
+    scene : as ``load_scene`` gives it; measurement_path : its channels have the names of the run's; scene_keys : KEY or
+    KEY=LOW:HIGH; engine : "" for the usual one; low_pass : Hz, on both, 0 for none; stages_folder : keeps finished
+    stages. The scene's crew computes the columns of Jacobians. Raises InputError and RunFailed.
     """
-    problem = identification_problem_of(scene, measurement, parameters, engine, low_pass)
+    problem = identification_problem_of(scene, measurement_path, scene_keys, engine, low_pass)
     with Crew.of(scene, default_workers=1).at_work(1 + len(problem.parameters), *folders_for_workers(scene)) as pool:
-        if folder is None:
+        if stages_folder is None:
             return uncertainty(fit(problem, None, report_progress, executor=pool), pool)
-        store = BlockStore(folder / STAGES_FOLDER)
-        with store.reserved_folder(_facts_of_stages(scene, measurement, problem, engine, low_pass)):
+        store = BlockStore(stages_folder / STAGES_FOLDER)
+        with store.reserved_folder(_facts_of_stages(scene, measurement_path, problem, engine, low_pass)):
             return uncertainty(fit(problem, store, report_progress, executor=pool), pool)
 
 
-def profiles_of(
+def likelihood_profiles_of(
     scene: Any,
     uncertainty: Uncertainty,
-    all_profiles: bool = False,
+    with_all_profiles: bool = False,
     report_progress: ReportProgress = lambda text, share: None,
 ) -> Iterator[LikelihoodProfile]:
     """Yield the likelihood profiles of all parameters, or only of those that the data do not determine; the scene's
     workers compute them."""
     wanted = [
-        k for k in range(len(uncertainty.fit.problem.parameters)) if all_profiles or not uncertainty.is_determined[k]
+        k
+        for k in range(len(uncertainty.fit.problem.parameters))
+        if with_all_profiles or not uncertainty.is_determined[k]
     ]
     with Crew.of(scene, default_workers=1).at_work(len(wanted), *folders_for_workers(scene)) as pool:
         for completed, (k, drawn_profile) in enumerate(
@@ -74,43 +76,50 @@ def profiles_of(
 
 
 def _facts_of_stages(
-    scene: Any, measurement: str | Path, problem: IdentificationProblem, engine: str, low_pass: float
+    scene: Any, measurement_path: str | Path, fit_problem: IdentificationProblem, engine: str, low_pass_frequency: float
 ) -> dict[str, Any]:
     """Inputs on which the saved stages of an identification depend; if one of them changes, the stages are computed
     anew."""
     table = scene.table()
     return {
         "scene": table,
-        "files": named_files([table, str(measurement)], Path(scene.folder)),
-        "measurement": str(measurement),
+        "files": named_files([table, str(measurement_path)], Path(scene.folder)),
+        "measurement": str(measurement_path),
         "parameters": [
             [parameter.name, parameter.start, parameter.lower_bound, parameter.upper_bound]
-            for parameter in problem.parameters
+            for parameter in fit_problem.parameters
         ],
         "engine": engine,
-        "low pass": low_pass,
+        "low pass": low_pass_frequency,
     }
 
 
 def report(
     scene: Any,
-    measurement: Path,
-    parameters: Sequence[str],
-    folder: Path,
+    measurement_path: Path,
+    scene_keys: Sequence[str],
+    output_folder: Path,
     report_progress: ReportProgress,
-    all_profiles: bool,
+    with_all_profiles: bool,
     **identify_options: Any,
 ) -> dict[str, Any]:
-    """Identify parameters; saves ``identify.json`` and ``identify.png``, and returns the summary. all_profiles :
+    """Identify parameters; saves ``identify.json`` and ``identify.png``, and returns the summary. with_all_profiles :
     likelihood profiles of all parameters, not only of undetermined ones."""
-    known = identify(scene, measurement, parameters, folder=folder, report_progress=report_progress, **identify_options)
-    drawn = list(profiles_of(scene, known, all_profiles, report_progress))
-    answer = identification_record(known, drawn)
-    write_whole(folder / "identify.json", json.dumps(answer, indent=1) + "\n")
-    draw_fit(known, f"{measurement.name} by {scene.title}", folder / "identify.png")
+    known = identify(
+        scene,
+        measurement_path,
+        scene_keys,
+        stages_folder=output_folder,
+        report_progress=report_progress,
+        **identify_options,
+    )
+    drawn = list(likelihood_profiles_of(scene, known, with_all_profiles, report_progress))
+    answer = identification_as_dict(known, drawn)
+    write_whole(output_folder / "identify.json", json.dumps(answer, indent=1) + "\n")
+    draw_fit(known, f"{measurement_path.name} by {scene.title}", output_folder / "identify.png")
     return {
-        "scene": f"{scene.title}, identified from {measurement}",
-        "folder": str(folder),
+        "scene": f"{scene.title}, identified from {measurement_path}",
+        "folder": str(output_folder),
         "failed": {},
         "identified": answer,
         "table": identification_lines(known, drawn),
@@ -118,7 +127,7 @@ def report(
     }
 
 
-def identification_record(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) -> dict[str, Any]:
+def identification_as_dict(uncertainty: Uncertainty, profiles: Sequence[LikelihoodProfile] = ()) -> dict[str, Any]:
     """Estimates, uncertainty and likelihood profiles as plain values for JSON; None for a missing standard error."""
     solved, names = uncertainty.fit, [parameter.name for parameter in uncertainty.fit.problem.parameters]
     return {
@@ -133,7 +142,7 @@ def identification_record(uncertainty: Uncertainty, profiles: Sequence[Likelihoo
                 names, solved.values, uncertainty.deviations, uncertainty.is_determined, solved.is_at_bound, strict=True
             )
         },
-        "correlation": {"of": names, "rows": correlation(uncertainty).tolist()},
+        "correlation": {"of": names, "rows": estimate_correlation(uncertainty).tolist()},
         "combinations": [
             {"standard error": error, "direction": dict(zip(names, vector.tolist(), strict=True))}
             for error, vector in uncertainty.combinations()
@@ -154,7 +163,7 @@ def identification_record(uncertainty: Uncertainty, profiles: Sequence[Likelihoo
     }
 
 
-def correlation(uncertainty: Uncertainty) -> np.ndarray:
+def estimate_correlation(uncertainty: Uncertainty) -> np.ndarray:
     """Correlation matrix (p, p) of the parameter estimates; 0 for estimates at a bound."""
     size = np.sqrt(np.clip(np.diag(uncertainty.covariance), 0.0, None))
     outer = np.outer(size, size)
@@ -165,12 +174,12 @@ def _finite_number(number: float) -> float | None:
     return float(number) if np.isfinite(number) else None
 
 
-def relative_errors(fit: ParameterFit) -> dict[str, float]:
+def relative_errors(parameter_fit: ParameterFit) -> dict[str, float]:
     """For each channel, ratio of the rms error of the fitted model to the rms of the measured channel."""
-    weights = fit.problem.weights > 0.0
+    weights = parameter_fit.problem.weights > 0.0
     return {
         channel.name: float(np.sqrt(np.mean(row[used] ** 2)))
-        for channel, row, used in zip(fit.problem.channels, fit.residuals, weights, strict=True)
+        for channel, row, used in zip(parameter_fit.problem.channels, parameter_fit.residuals, weights, strict=True)
     }
 
 
@@ -219,10 +228,14 @@ def clock_delay(uncertainty: Uncertainty) -> float:
         for row, values in zip(problem.predicted(start), measured, strict=True)
     ]
     shift = time_shift(pairs).seconds
-    return shift if _mean_distance(pairs, shift) * SHIFT_IMPROVEMENT < _mean_distance(pairs, 0.0) else 0.0
+    return (
+        shift
+        if _mean_channel_difference(pairs, shift) * SHIFT_IMPROVEMENT < _mean_channel_difference(pairs, 0.0)
+        else 0.0
+    )
 
 
-def _mean_distance(channel_pairs: Sequence[ChannelPair], time_shift_seconds: float) -> float:
+def _mean_channel_difference(channel_pairs: Sequence[ChannelPair], time_shift_seconds: float) -> float:
     """Mean over channels of the rms difference of run and measurement divided by the measurement's standard deviation,
     with the measurement shifted earlier by a time (s)."""
     shares = []
@@ -244,9 +257,11 @@ def _combination_lines(uncertainty: Uncertainty) -> list[str]:
         return []
     names = [parameter.name for parameter in uncertainty.fit.problem.parameters]
 
-    def vector_text(vector: np.ndarray) -> str:
-        order = np.argsort(-np.abs(vector))
-        return " ".join(f"{vector[k]:+.2f} {names[k]}" for k in order if abs(vector[k]) >= LEAST_NAMED_COMPONENT)
+    def vector_text(combination: np.ndarray) -> str:
+        order = np.argsort(-np.abs(combination))
+        return " ".join(
+            f"{combination[k]:+.2f} {names[k]}" for k in order if abs(combination[k]) >= LEAST_NAMED_COMPONENT
+        )
 
     (best, first_direction), (worst, last_direction) = combinations[0], combinations[-1]
     return [
@@ -256,7 +271,7 @@ def _combination_lines(uncertainty: Uncertainty) -> list[str]:
     ]
 
 
-def draw_fit(uncertainty: Uncertainty, title: str, path: Path) -> None:
+def draw_fit(uncertainty: Uncertainty, title: str, figure_path: Path) -> None:
     """Save a figure of every measured channel with the fitted model, and below it their difference."""
     from models.drawing.figures import BLUE, DARK, VERMILION, add_heading, save, subplots
 
@@ -274,4 +289,4 @@ def draw_fit(uncertainty: Uncertainty, title: str, path: Path) -> None:
     axes[-1, 0].set_xlabel("time [s]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     add_heading(figure, title, {})
-    save(figure, path)
+    save(figure, figure_path)

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.command.asked import load_scene, needs_no_extras, study_of
+from studies.command.asked import load_scene, runs_without_extras, study_module_of
 from studies.command.waiting import CompilationTimer
 
 
@@ -27,12 +27,12 @@ class SecondCompiler(CompilationTimer):
 
     EVENT = "numba:compile"
 
-    def __init__(self, command: list[str]) -> None:
+    def __init__(self, process_command: list[str]) -> None:
         super().__init__()
-        self.command = command
+        self.command = process_command
         self.process: subprocess.Popen[bytes] | None = None
 
-    def _start(self, *event: Any) -> None:
+    def _start(self, *compiler_event: Any) -> None:
         if self.process is None:
             nowhere = subprocess.DEVNULL
             self.process = subprocess.Popen(self.command, stdin=nowhere, stdout=nowhere, stderr=nowhere)
@@ -46,18 +46,20 @@ class SecondCompiler(CompilationTimer):
 
 
 @contextmanager
-def second_process_compiles(name: str, changes: list[str], scene: Any, engines: tuple[str, ...]) -> Iterator[None]:
+def second_process_compiles(
+    scene_name: str, key_changes: list[str], scene: Any, engines: tuple[str, ...]
+) -> Iterator[None]:
     """Context in which a second process compiles the kernels of the scene's last engine if they are missing.
 
-    name, changes : which scene this is, as the user gave them. Nothing is run twice that has workers of its own, or
-    code of the user's.
+    scene_name, key_changes : which scene this is, as the user gave them. Nothing is run twice that has workers of its
+    own, or code of the user's.
     """
     idle = len(engines) > 1 and (os.cpu_count() or 1) > 1 and sys.stderr.isatty()
-    if not idle or not needs_no_extras(scene, engines, study_of(scene)):
+    if not idle or not runs_without_extras(scene, engines, study_module_of(scene)):
         yield
         return
     with TemporaryDirectory() as folder:
-        request = json.dumps([name, changes, engines[-1], scene.error, folder])
+        request = json.dumps([scene_name, key_changes, engines[-1], scene.error, folder])
         compiler = SecondCompiler([sys.executable, "-P", "-m", __name__, request])
         compiler.attach()
         try:
@@ -66,14 +68,13 @@ def second_process_compiles(name: str, changes: list[str], scene: Any, engines: 
             compiler.end()
 
 
-def run_for_kernels(name: str, changes: list[str], engine: str, error: bool, folder: str) -> None:
-    """Run a scene in one engine, which compiles its kernels; results are saved in ``folder``. The scene is checked by
-    the first process.
-    """
-    scene = load_scene(name, changes).model_copy(update={"error": error})
+def run_for_kernels(scene_name: str, key_changes: list[str], engine: str, with_error: bool, output_folder: str) -> None:
+    """Run a scene in one engine, which compiles its kernels; results are saved in ``output_folder``. The scene is
+    checked by the first process."""
+    scene = load_scene(scene_name, key_changes).model_copy(update={"error": with_error})
     if scene.system in LATE_KERNELS:
         LATE_KERNELS[scene.system]()
-    study_of(scene).run(scene, (engine,), Path(folder), lambda text, share: None)
+    study_module_of(scene).run(scene, (engine,), Path(output_folder), lambda text, share: None)
 
 
 def compile_fastsim() -> None:

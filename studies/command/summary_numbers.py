@@ -25,45 +25,51 @@ def summary_scalars(summary: dict[str, Any]) -> dict[str, float]:
     return {name: value for name, value in _scalars_of("", "", summary) if math.isfinite(value)}
 
 
-def _scalars_of(name: str, unit: str, summary_value: Any) -> Iterator[tuple[str, float]]:
+def _scalars_of(quantity_name: str, quantity_unit: str, summary_value: Any) -> Iterator[tuple[str, float]]:
     if isinstance(summary_value, dict):
-        unit = (
+        quantity_unit = (
             f" [{summary_value['unit']}]"
             if isinstance(summary_value.get("unit"), str) and summary_value["unit"]
-            else unit
+            else quantity_unit
         )
         for key, inner in summary_value.items():
             if key not in SKIPPED_KEYS:
-                yield from _scalars_of(name if key in FRAME_KEYS else _joined_name(name, str(key)), unit, inner)
+                yield from _scalars_of(
+                    quantity_name if key in FRAME_KEYS else _joined_name(quantity_name, str(key)), quantity_unit, inner
+                )
     elif isinstance(summary_value, list):
-        yield from _numbers_of_list(name, unit, summary_value)
+        yield from _numbers_of_list(quantity_name, quantity_unit, summary_value)
     elif isinstance(summary_value, int | float) and not isinstance(summary_value, bool):
-        yield name + unit, float(summary_value) if isinstance(summary_value, float) else summary_value
+        yield quantity_name + quantity_unit, float(summary_value) if isinstance(summary_value, float) else summary_value
 
 
-def _numbers_of_list(name: str, unit: str, values: list[Any]) -> Iterator[tuple[str, float]]:
-    if len(values) > LONGEST_LIST and all(isinstance(value, dict) for value in values):
+def _numbers_of_list(quantity_name: str, quantity_unit: str, summary_list: list[Any]) -> Iterator[tuple[str, float]]:
+    if len(summary_list) > LONGEST_LIST and all(isinstance(value, dict) for value in summary_list):
         columns = {
-            key: [record[key] for record in values if key in record] for key in values[0] if key not in SKIPPED_KEYS
+            key: [record[key] for record in summary_list if key in record]
+            for key in summary_list[0]
+            if key not in SKIPPED_KEYS
         }
         yield from _scalars_of(
-            name, unit, {key: numbers for key, numbers in columns.items() if all(map(_is_number, numbers))}
+            quantity_name,
+            quantity_unit,
+            {key: numbers for key, numbers in columns.items() if all(map(_is_number, numbers))},
         )
-    elif len(values) > LONGEST_LIST:
-        numbers = [float(value) for value in values if _is_number(value)]
+    elif len(summary_list) > LONGEST_LIST:
+        numbers = [float(value) for value in summary_list if _is_number(value)]
         if numbers:
-            yield f"{_joined_name(name, 'largest')}{unit}", max(map(abs, numbers))
+            yield f"{_joined_name(quantity_name, 'largest')}{quantity_unit}", max(map(abs, numbers))
             yield (
-                f"{_joined_name(name, 'rms')}{unit}",
+                f"{_joined_name(quantity_name, 'rms')}{quantity_unit}",
                 math.sqrt(math.fsum(value * value for value in numbers) / len(numbers)),
             )
     else:
-        leading = (takewhile(_is_text, value.values()) if isinstance(value, dict) else () for value in values)
+        leading = (takewhile(_is_text, value.values()) if isinstance(value, dict) else () for value in summary_list)
         labels = [", ".join(texts) for texts in leading]
         if len(set(labels)) < len(labels) or not all(labels):
-            labels = [str(i + 1) for i in range(len(values))]
-        for label, value in zip(labels, values, strict=True):
-            yield from _scalars_of(_joined_name(name, label), unit, value)
+            labels = [str(i + 1) for i in range(len(summary_list))]
+        for label, value in zip(labels, summary_list, strict=True):
+            yield from _scalars_of(_joined_name(quantity_name, label), quantity_unit, value)
 
 
 def _is_text(summary_value: Any) -> bool:
@@ -76,15 +82,15 @@ def _is_number(summary_value: Any) -> bool:
     )
 
 
-def _joined_name(name: str, key: str) -> str:
-    return f"{name}, {key}" if name else key
+def _joined_name(parent_name: str, summary_key: str) -> str:
+    return f"{parent_name}, {summary_key}" if parent_name else summary_key
 
 
-def present_numbers(column: list[Any]) -> list[Any]:
+def present_numbers(number_column: list[Any]) -> list[Any]:
     """Values of a column without missing ones."""
-    return [value for value in column if value is not None]
+    return [value for value in number_column if value is not None]
 
 
-def has_several_values(column: list[Any]) -> bool:
+def has_several_values(number_column: list[Any]) -> bool:
     """Whether a column has different values."""
-    return len(set(present_numbers(column))) > 1
+    return len(set(present_numbers(number_column))) > 1

@@ -49,61 +49,66 @@ WARNING_MARK = {
 
 @dataclass(frozen=True)
 class SweepResults:
-    """Results of a sweep of ``scene`` over ``key``, with a value, a failure record and results for each point.
+    """Results of a sweep of ``scene`` over ``swept_key``, with a value, a failure record and results for each point.
 
-    columns : numbers over the points, by name; failures : reasons of failed runs at each point, by engine; results : of
-    each point, without channels, by name; unit : of the key's values.
+    columns_by_quantity : numbers over the points, by name; failures_of_points : reasons of failed runs at each point,
+    by engine; results_of_points : of each point, without channels, by name; key_unit : of the key's values.
     """
 
     scene: str
-    key: str
-    values: tuple[Any, ...]
-    columns: Columns
-    failures: list[dict[str, str]]
-    results: Sequence[Results]
-    unit: str = "SI"
+    swept_key: str
+    swept_values: tuple[Any, ...]
+    columns_by_quantity: Columns
+    failures_of_points: list[dict[str, str]]
+    results_of_points: Sequence[Results]
+    key_unit: str = "SI"
 
     def broken_points(self, engine: str) -> list[int]:
         """Indices of the points at which a result of an engine, or of any engine for "", broke an assumption."""
         return [
             i
-            for i, results in enumerate(self.results)
+            for i, results in enumerate(self.results_of_points)
             if any(map(broken_of, _results_of_engine(results, engine).values()))
         ]
 
     def warned_points(self, engine: str) -> list[int]:
         """Indices of the points at which a result of an engine, or of any engine for "", states an error large enough
         for a warning."""
-        shown = (map(largest_estimate, _results_of_engine(results, engine).values()) for results in self.results)
+        shown = (
+            map(largest_estimate, _results_of_engine(results, engine).values()) for results in self.results_of_points
+        )
         return [i for i, worst in enumerate(shown) if any(error is not None and error.warned for error in worst)]
 
 
-def _results_of_engine(results: Results, engine: str) -> Results:
+def _results_of_engine(point_results: Results, engine: str) -> Results:
     """Results that an engine's curve is based on: results of this engine, and results that belong to no engine."""
     other_engines = set(LABELS) - {engine} if engine else set()
-    return {name: run for name, run in results.items() if run.data.attrs["engine"] not in other_engines}
+    return {name: run for name, run in point_results.items() if run.data.attrs["engine"] not in other_engines}
 
 
-def draw_sweep(sweep_results: SweepResults, folder: Path) -> list[str]:
+def draw_sweep(sweep_results: SweepResults, output_folder: Path) -> list[str]:
     """Save the figures ``sweep.png``, ``sweep-2.png``, ... of a sweep, and return their names; none if no number
     changes."""
-    changing = _changing_quantities(sweep_results.columns)
+    changing = _changing_quantities(sweep_results.columns_by_quantity)
     size, names = PANELS_ACROSS * PANELS_DOWN, list[str]()
     shown = list(changing.items())[: size * MOST_PAGES]
     for first in range(0, len(shown), size):
         name = f"sweep-{first // size + 1}.png" if first else "sweep.png"
         _draw_page(
-            sweep_results, shown[first : first + size], folder / name, f"the {len(changing)} quantities that change"
+            sweep_results,
+            shown[first : first + size],
+            output_folder / name,
+            f"the {len(changing)} quantities that change",
         )
         names.append(name)
     return names
 
 
-def _changing_quantities(columns: Columns) -> dict[str, dict[str, list[Any]]]:
+def _changing_quantities(columns_by_quantity: Columns) -> dict[str, dict[str, list[Any]]]:
     """Columns of the quantities that change in the sweep, by quantity and engine; the engine is "" for numbers without
     one."""
     panels: dict[str, dict[str, list[Any]]] = {}
-    for name, column in columns.items():
+    for name, column in columns_by_quantity.items():
         first, _, rest_of_name = name.partition(", ")
         engine, quantity_name = (first, rest_of_name) if rest_of_name and first in LABELS else ("", name)
         panels.setdefault(quantity_name, {})[engine] = column
@@ -115,10 +120,10 @@ def _changing_quantities(columns: Columns) -> dict[str, dict[str, list[Any]]]:
 
 
 def _draw_page(
-    sweep_results: SweepResults, shown_curves: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str
+    sweep_results: SweepResults, shown_curves: list[tuple[str, dict[str, list[Any]]]], figure_path: Path, page_note: str
 ) -> None:
     figure, axes = panels(len(shown_curves), min(PANELS_ACROSS, len(shown_curves)), 2.3)
-    sweep_positions, ticks = _axis_positions(sweep_results.values)
+    sweep_positions, ticks = _axis_positions(sweep_results.swept_values)
     for axis, (quantity_name, curves) in zip(axes, shown_curves, strict=True):
         _draw_panel(axis, sweep_positions, quantity_name, curves, sweep_results, "o" if ticks else "o-")
         if ticks:
@@ -127,10 +132,10 @@ def _draw_page(
             axis.set_xscale("log")
         else:
             axis.locator_params(axis="x", nbins=6)
-        axis.set_xlabel(sweep_results.key if ticks else f"{sweep_results.key} [{sweep_results.unit}]")
+        axis.set_xlabel(sweep_results.swept_key if ticks else f"{sweep_results.swept_key} [{sweep_results.key_unit}]")
     legend_below(figure, *axes)
-    add_heading(figure, f"{sweep_results.scene.rpartition('/')[2]} over {sweep_results.key}: {note}")
-    save(figure, path)
+    add_heading(figure, f"{sweep_results.scene.rpartition('/')[2]} over {sweep_results.swept_key}: {page_note}")
+    save(figure, figure_path)
 
 
 def _axis_positions(key_values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
@@ -143,36 +148,36 @@ def _axis_positions(key_values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]
 def _draw_panel(
     axis: Any,
     sweep_positions: np.ndarray,
-    quantity: str,
-    curves: dict[str, list[Any]],
+    quantity_name: str,
+    curves_by_engine: dict[str, list[Any]],
     sweep_results: SweepResults,
-    style: str,
+    axis_style: str,
 ) -> None:
     order = np.argsort(sweep_positions)
-    for i, (engine, column) in enumerate(curves.items()):
+    for i, (engine, column) in enumerate(curves_by_engine.items()):
         axis.plot(
             sweep_positions[order],
             np.array(column, float)[order],
-            style,
+            axis_style,
             color=COLOURS.get(engine, GREY),
             markersize=3.5,
             linewidth=2.2 - 0.6 * min(i, 2),
             label=LABELS[engine] or None,
         )
         _draw_marks(axis, sweep_positions, np.array(column, float), sweep_results, engine)
-    if all(_wants_log_axis(np.array(present_numbers(column), float)) for column in curves.values()):
+    if all(_wants_log_axis(np.array(present_numbers(column), float)) for column in curves_by_engine.values()):
         axis.set_yscale("log")
     else:
         axis.ticklabel_format(axis="y", useOffset=False)
     lost = [
         i
-        for i, failed in enumerate(sweep_results.failures)
-        if failed and any(col[i] is None for col in curves.values())
+        for i, failed in enumerate(sweep_results.failures_of_points)
+        if failed and any(col[i] is None for col in curves_by_engine.values())
     ]
     if lost:
         foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "linestyle": "none"}
         axis.plot(sweep_positions[lost], np.full(len(lost), 0.04), **FAILED_MARK, **foot)
-    axis.set_title(wrapped_text(_with_unit(quantity), 0.47 * COLUMN_WIDTH, 9), fontsize=9)
+    axis.set_title(wrapped_text(_with_unit(quantity_name), 0.47 * COLUMN_WIDTH, 9), fontsize=9)
 
 
 def _draw_marks(
@@ -190,11 +195,17 @@ def _draw_marks(
             )
 
 
-def _with_unit(quantity: str) -> str:
+def _with_unit(quantity_name: str) -> str:
     """Label of a quantity with its unit. If the name holds no unit, the unit is "-" for counts and "SI" for all
     others."""
-    return quantity if "[" in quantity else f"{quantity} [{'-' if quantity.startswith('counts') else 'SI'}]"
+    return (
+        quantity_name
+        if "[" in quantity_name
+        else f"{quantity_name} [{'-' if quantity_name.startswith('counts') else 'SI'}]"
+    )
 
 
-def _wants_log_axis(values: np.ndarray) -> bool:
-    return bool(len(values) and (values > 0).all() and values.max() > LOGARITHMIC_RATIO * values.min())
+def _wants_log_axis(curve_values: np.ndarray) -> bool:
+    return bool(
+        len(curve_values) and (curve_values > 0).all() and curve_values.max() > LOGARITHMIC_RATIO * curve_values.min()
+    )

@@ -37,17 +37,17 @@ def _ignore_progress(activity: str, share: float) -> None:
 
 @dataclass(frozen=True)
 class TwinOptions:
-    """Options of the command ``twin``. states : number of random states at which accelerations are compared;
-    compare_paths : whether runs in time are compared, too; tolerance (rad, m) and quantity for which the cheapest
-    settings are sought, None for no search and for all joints; controls : file of the controls in these runs; folder :
-    in which all files that a model names must lie, the model's own if None."""
+    """Options of the command ``twin``. state_count : number of random states at which accelerations are compared;
+    compare_paths : whether runs in time are compared, too; tolerance (rad, m) and quantity_name for which the cheapest
+    settings are sought, None for no search and for all joints; controls_path : file of the controls in these runs;
+    resource_folder : in which all files that a model names must lie, the model's own if None."""
 
-    states: int = STATE_COUNT
+    state_count: int = STATE_COUNT
     compare_paths: bool = True
     tolerance: float | None = None
-    quantity: str | None = None
-    controls: Path | None = None
-    folder: Path | None = None
+    quantity_name: str | None = None
+    controls_path: Path | None = None
+    resource_folder: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class ExaminedFile:
 
 
 @dataclass(frozen=True, eq=False)
-class Twins:
+class TwinResults:
     """Results of the command ``twin`` for one file or two. comparison : of the two files; path_gap : difference of
     their runs in time, None if not requested or if the files have different coordinates."""
 
@@ -98,68 +98,73 @@ class Twins:
         return files and (self.comparison is None or self.comparison.alike)
 
 
-def check_arguments(files: Sequence[Path], page: Path | None) -> None:
+def check_arguments(model_paths: Sequence[Path], page_path: Path | None) -> None:
     """Raise InputError for more than two files, or for a page that cannot be written."""
-    if len(files) > 2:
-        raise InputError("FILES", "", len(files), "files: one, or two to be compared")
-    if page is None:
+    if len(model_paths) > 2:
+        raise InputError("FILES", "", len(model_paths), "files: one, or two to be compared")
+    if page_path is None:
         return
-    if page.exists():
-        raise InputError("--page", "", str(page), "is there already, and nothing is overwritten: name another file")
-    if not page.parent.is_dir():
-        raise InputError("--page", "", str(page), "lies in a folder that does not exist")
+    if page_path.exists():
+        raise InputError(
+            "--page", "", str(page_path), "is there already, and nothing is overwritten: name another file"
+        )
+    if not page_path.parent.is_dir():
+        raise InputError("--page", "", str(page_path), "lies in a folder that does not exist")
 
 
-def listed_content_kinds(text: str) -> tuple[str, ...]:
+def listed_content_kinds(option_text: str) -> tuple[str, ...]:
     """Names of kinds of model content in an option's text, separated by commas."""
-    return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    return tuple(dict.fromkeys(name.strip() for name in option_text.split(",") if name.strip()))
 
 
 def examine(
-    files: Sequence[Path],
-    without: Sequence[str],
+    model_paths: Sequence[Path],
+    omitted_kinds: Sequence[str],
     twin_options: TwinOptions,
     report_progress: ReportProgress = _ignore_progress,
-) -> Twins:
+) -> TwinResults:
     """Compare each model file with its builds, and both files if there are two; raises InputError if a file cannot be
     read or built.
 
     report_progress : called with the current task and the finished share of all work.
     """
-    if twin_options.states < 1:
-        raise InputError("--states", "", twin_options.states, "must be 1 or more")
-    if twin_options.quantity is not None and twin_options.tolerance is None:
-        raise InputError("--quantity", "", twin_options.quantity, "is what --tolerance is of: give both, or neither")
-    if twin_options.controls and (
-        not twin_options.compare_paths or twin_options.tolerance is not None or len(files) > 1
+    if twin_options.state_count < 1:
+        raise InputError("--states", "", twin_options.state_count, "must be 1 or more")
+    if twin_options.quantity_name is not None and twin_options.tolerance is None:
+        raise InputError(
+            "--quantity", "", twin_options.quantity_name, "is what --tolerance is of: give both, or neither"
+        )
+    if twin_options.controls_path and (
+        not twin_options.compare_paths or twin_options.tolerance is not None or len(model_paths) > 1
     ):
         allowed = "acts on paths of one file alone: leave out --no-paths, --tolerance and other files"
-        raise InputError("--controls", "", str(twin_options.controls), allowed)
-    read_files = [read(path, without, twin_options.folder) for path in files]
+        raise InputError("--controls", "", str(twin_options.controls_path), allowed)
+    read_files = [read(path, omitted_kinds, twin_options.resource_folder) for path in model_paths]
     for file in read_files if twin_options.compare_paths else ():
         step_count_of_path(file.twin)
     tables = [
-        read_controls(twin_options.controls, file.twin.model) if twin_options.controls else None for file in read_files
+        read_controls(twin_options.controls_path, file.twin.model) if twin_options.controls_path else None
+        for file in read_files
     ]
-    parts = len(files) + (len(files) > 1)
+    parts = len(model_paths) + (len(model_paths) > 1)
     examined = [
         _examine_file(file, table, twin_options, partial(_report_progress, report_progress, i, parts))
         for i, (file, table) in enumerate(zip(read_files, tables, strict=True))
     ]
     if len(examined) < 2:
-        return Twins(tuple(examined), None)
-    report_progress("comparing the files", len(files) / parts)
+        return TwinResults(tuple(examined), None)
+    report_progress("comparing the files", len(model_paths) / parts)
     first, second = (examined_file.file.twin for examined_file in examined)
     names = [examined_file.name for examined_file in examined]
     if names[0] == names[1]:
-        names = [str(path) for path in files]
+        names = [str(path) for path in model_paths]
     comparison = compare(replace(first, name=names[0]), replace(second, name=names[1]))
     gap = (
         compare_two_paths(first, second)
         if twin_options.compare_paths and comparison.acceleration_agreement is not None
         else None
     )
-    return Twins(tuple(examined), comparison, gap)
+    return TwinResults(tuple(examined), comparison, gap)
 
 
 def _report_progress(
@@ -170,41 +175,56 @@ def _report_progress(
 
 
 def _examine_file(
-    file: ModelFile, table: ControlTable | None, twin_options: TwinOptions, report_progress: ReportProgress
+    model_file: ModelFile,
+    control_table: ControlTable | None,
+    twin_options: TwinOptions,
+    report_progress: ReportProgress,
 ) -> ExaminedFile:
     """Compare a model file with its builds, then its runs in time, and find its cheapest settings if requested. Each
     task counts as a third of the progress."""
     agreements = certificate(
-        file.twin, twin_options.states, lambda share: report_progress("comparing accelerations", share / 3)
+        model_file.twin, twin_options.state_count, lambda share: report_progress("comparing accelerations", share / 3)
     )
     explained = {
-        agreement.build: removals_that_agree(file.twin, agreement.build)
+        agreement.build: removals_that_agree(model_file.twin, agreement.build)
         for agreement in agreements
         if not agreement.alike
     }
-    lost = misread_numbers(file) if file.document.kind == "URDF" else []
+    lost = misread_numbers(model_file) if model_file.document.kind == "URDF" else []
     report = None
     if twin_options.compare_paths:
-        activity = f"marching {step_count_of_path(file.twin):,} steps by every build"
+        activity = f"marching {step_count_of_path(model_file.twin):,} steps by every build"
         report_progress(activity, 1 / 3)
-        report = compare_paths(file.twin, None, table, lambda share: report_progress(activity, (1 + share) / 3))
+        report = compare_paths(
+            model_file.twin, None, control_table, lambda share: report_progress(activity, (1 + share) / 3)
+        )
     price: tuple[str, ...] = ()
     if twin_options.tolerance is not None:
         from models.advice.own_model_price import recommended_settings
         from models.advice.price.text import recommendation_lines as price_lines
 
         report_progress("pricing", 2 / 3)
-        price = tuple(price_lines(recommended_settings(file.twin, twin_options.tolerance, twin_options.quantity)))
+        price = tuple(
+            price_lines(recommended_settings(model_file.twin, twin_options.tolerance, twin_options.quantity_name))
+        )
     return ExaminedFile(
-        file, agreements, explained, tuple(lost), report, price, tuple(_constraint_lines(file, twin_options.states))
+        model_file,
+        agreements,
+        explained,
+        tuple(lost),
+        report,
+        price,
+        tuple(_constraint_lines(model_file, twin_options.state_count)),
     )
 
 
-def _constraint_lines(file: ModelFile, state_count: int) -> Iterator[str]:
+def _constraint_lines(model_file: ModelFile, state_count: int) -> Iterator[str]:
     """Yield lines on joint limits that test states exceed, on dry friction, and on constraints, which are soft in
     MuJoCo, with the effect of the softness on accelerations."""
-    twin = file.twin
-    beyond = [limits_struck(twin)(q) for q, _ in comparison_states(twin, state_count)] if file.ignored_limits else []
+    twin = model_file.twin
+    beyond = (
+        [limits_struck(twin)(q) for q, _ in comparison_states(twin, state_count)] if model_file.ignored_limits else []
+    )
     if any(beyond):
         names = dict.fromkeys(name for struck in beyond for name in struck)
         yield f"limits of {first_names_text(tuple(names))} would act at {sum(map(bool, beyond))} of the states"
@@ -220,12 +240,13 @@ def _constraint_lines(file: ModelFile, state_count: int) -> Iterator[str]:
         )
 
 
-def _friction_line(twin: TwinModel, count: int) -> str:
+def _friction_line(twin_model: TwinModel, state_count: int) -> str:
     """Line on dry friction: the number of states at which builds are compared, and the law that each build is compared
     with."""
-    states = comparison_states(twin, count)
-    head = f"dry friction of {plural(len(twin.driven.frictions), 'joint')}: compared at {len(states)} of {count} states"
-    if sliding_states(twin, states):
+    states = comparison_states(twin_model, state_count)
+    joints = plural(len(twin_model.driven.frictions), "joint")
+    head = f"dry friction of {joints}: compared at {len(states)} of {state_count} states"
+    if sliding_states(twin_model, states):
         return (
             f"{head}, at which all of it slides, with faster rates where it would not; where it sticks, MuJoCo's gives "
             "way"
@@ -236,25 +257,27 @@ def _friction_line(twin: TwinModel, count: int) -> str:
     )
 
 
-def plural(number: int, noun: str) -> str:
+def plural(count: int, noun: str) -> str:
     """Text of a number with its noun, in the plural unless the number is 1."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
-def limits_sentence(names: Sequence[str]) -> str:
-    """Sentence on the number of joints and tendons whose limits are not built; names : such as "joint hinge"."""
-    sorts = {sort: sum(name.startswith(sort) for name in names) for sort in ("joint", "tendon")}
+def limits_sentence(joint_names: Sequence[str]) -> str:
+    """Sentence on the number of joints and tendons whose limits are not built; joint_names : such as "joint hinge"."""
+    sorts = {sort: sum(name.startswith(sort) for name in joint_names) for sort in ("joint", "tendon")}
     told = " and ".join(plural(number, sort) for sort, number in sorts.items() if number)
     return f"limits of {told} are not built; states are drawn inside the ranges of joints"
 
 
-def twin_lines(twins: Twins) -> list[str]:
+def twin_lines(twin_results: TwinResults) -> list[str]:
     """Lines for the screen on all examined model files, and on their comparison."""
     rows = list[str]()
-    for examined_file in twins.examined:
+    for examined_file in twin_results.examined:
         rows += _file_lines(examined_file)
-    rows += _comparison_lines(twins.comparison, twins.names) if twins.comparison is not None else []
-    return rows + ([twins.path_gap.line()] if twins.path_gap is not None else [])
+    rows += (
+        _comparison_lines(twin_results.comparison, twin_results.names) if twin_results.comparison is not None else []
+    )
+    return rows + ([twin_results.path_gap.line()] if twin_results.path_gap is not None else [])
 
 
 def verdict_sentence(examined_file: ExaminedFile) -> str:
@@ -297,17 +320,20 @@ def _file_lines(examined_file: ExaminedFile) -> list[str]:
     return rows + [f"  {line}".rstrip() for line in examined_file.price_lines]
 
 
-def _at_which_controls(difference: Difference) -> str:
+def _at_which_controls(element_difference: Difference) -> str:
     """Phrase on the controls at which an actuator's difference has no influence; "" for all other elements."""
-    return " at controls of 0, or the nearest in range" if difference.owner.startswith("actuator ") else ""
+    return " at controls of 0, or the nearest in range" if element_difference.owner.startswith("actuator ") else ""
 
 
-def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]:
-    if comparison.acceleration_agreement is None:
-        rows = ["the files have not the same coordinates:", *(f"  {text}" for text in comparison.unmatched_coordinates)]
-        return rows + [f"  {difference.sentence(names)}" for difference in comparison.differences]
-    agreement, influential = comparison.acceleration_agreement, comparison.influential
-    head = "both files move alike" if comparison.alike else "the files do not move alike"
+def _comparison_lines(model_comparison: Comparison, model_names: Sequence[str]) -> list[str]:
+    if model_comparison.acceleration_agreement is None:
+        rows = [
+            "the files have not the same coordinates:",
+            *(f"  {text}" for text in model_comparison.unmatched_coordinates),
+        ]
+        return rows + [f"  {difference.sentence(model_names)}" for difference in model_comparison.differences]
+    agreement, influential = model_comparison.acceleration_agreement, model_comparison.influential
+    head = "both files move alike" if model_comparison.alike else "the files do not move alike"
     rows = [
         f"{head}: accelerations differ by {two_digit_text(agreement.acceleration)}, most at {agreement.worst}; "
         f"mass matrices by {two_digit_text(agreement.mass)}"
@@ -318,14 +344,14 @@ def _comparison_lines(comparison: Comparison, names: Sequence[str]) -> list[str]
             if difference.influence is None
             else f"changes accelerations or masses by {two_digit_text(difference.influence)}"
         )
-        rows.append(f"  {difference.sentence(names)} ({size})")
-    if not comparison.alike:
-        rows.append(f"  {comparison.remainder_text()}")
+        rows.append(f"  {difference.sentence(model_names)} ({size})")
+    if not model_comparison.alike:
+        rows.append(f"  {model_comparison.remainder_text()}")
     rows += [
-        f"  without influence{_at_which_controls(difference)}: {difference.sentence(names)}"
-        for difference in comparison.silent_differences
+        f"  without influence{_at_which_controls(difference)}: {difference.sentence(model_names)}"
+        for difference in model_comparison.silent_differences
     ]
     return rows + [
-        f"  not compared, since it is off or MuJoCo's alone: {difference.sentence(names)}"
-        for difference in comparison.not_compared
+        f"  not compared, since it is off or MuJoCo's alone: {difference.sentence(model_names)}"
+        for difference in model_comparison.not_compared
     ]

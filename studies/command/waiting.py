@@ -18,9 +18,9 @@ BAR_DELAY, BAR_PERIOD = 1.0, 0.1
 """Time (s) until the bar is shown, and between two updates."""
 SLOW_COMPILATION = 0.4
 """Time (s) of a compilation from which the bar shows it; loading a compiled kernel takes less."""
-LEAST_SHARE = 0.01
+LEAST_SHARE_FOR_ESTIMATE = 0.01
 """Finished share of the work from which the bar shows the remaining time."""
-COMPILE_SECONDS = {
+COMPILE_SECONDS_OF_SYSTEM = {
     "pitch-plane": 5.0,
     "ride": 5.0,
     "wheelset": 15.0,
@@ -58,12 +58,12 @@ class CompilationTimer:
         """Stop listening to numba's compilation events."""
         self._remove()
 
-    def _start(self, *event: Any) -> None:
+    def _start(self, *compiler_event: Any) -> None:
         if self.depth == 0:
             self.since = time.monotonic()
         self.depth += 1
 
-    def _end_compilation(self, *event: Any) -> None:
+    def _end_compilation(self, *compiler_event: Any) -> None:
         self.depth = max(0, self.depth - 1)
         if self.depth == 0:
             self.total += time.monotonic() - self.since
@@ -81,19 +81,19 @@ class CompilationTimer:
 class ProgressState:
     """State of the progress bar: current task, finished share, the running time integration, and numba's compilations.
 
-    system : of the scene, for the time that its kernels take.
+    system_name : of the scene, for the time that its kernels take.
     """
 
-    text: str
-    system: str = ""
-    share: float = 0.0
+    task_text: str
+    system_name: str = ""
+    finished_share: float = 0.0
     start_time: float = field(default_factory=time.monotonic)
     compilations: CompilationTimer = field(default_factory=CompilationTimer)
     _march: tuple[Any, float] = (None, 0.0)
 
-    def tell(self, text: str, share: float) -> None:
+    def tell(self, task_text: str, finished_share: float) -> None:
         """Set the bar's text to the task that begins, and its finished share (0 to 1)."""
-        self.text, self.share = text, min(max(share, 0.0), 1.0)
+        self.task_text, self.finished_share = task_text, min(max(finished_share, 0.0), 1.0)
 
     def state(self) -> tuple[str, float | None, str]:
         """Current task, finished share and text of the remaining time for the bar; the share is None if it is
@@ -101,7 +101,7 @@ class ProgressState:
         if self.compilations.is_compiling():
             compilation_seconds, expected_seconds = (
                 self.compilations.compilation_seconds(),
-                COMPILE_SECONDS.get(self.system, 0.0),
+                COMPILE_SECONDS_OF_SYSTEM.get(self.system_name, 0.0),
             )
             share = compilation_seconds / expected_seconds if expected_seconds > compilation_seconds else None
             return (
@@ -112,23 +112,34 @@ class ProgressState:
         worked = time.monotonic() - self.start_time - self.compilations.compilation_seconds()
         march = PROGRESS_FUNCTIONS[-1] if PROGRESS_FUNCTIONS else None
         if march is None:
-            return self.text, self.share or None, _time_left_text(_remaining_seconds(self.share, worked), worked)
+            return (
+                self.task_text,
+                self.finished_share or None,
+                _time_left_text(_remaining_seconds(self.finished_share, worked), worked),
+            )
         if march is not self._march[0]:
             self._march = march, worked
         share, since = 0.0, worked - self._march[1]
         with suppress(Exception):  # an engine that is asked at a bad time
             share = min(max(float(march()), 0.0), 1.0)
-        return self.text, share, _time_left_text(_remaining_seconds(share, since), worked)
+        return self.task_text, share, _time_left_text(_remaining_seconds(share, since), worked)
 
 
-def _remaining_seconds(share: float, seconds: float) -> float | None:
-    """Remaining time (s) of a task of which ``share`` took ``seconds``; None while the share is too small."""
-    return seconds * (1.0 - share) / share if share > LEAST_SHARE else None
+def _remaining_seconds(finished_share: float, elapsed_seconds: float) -> float | None:
+    """Remaining time (s) of a task of which ``finished_share`` took ``elapsed_seconds``; None while the share is too
+    small."""
+    return (
+        elapsed_seconds * (1.0 - finished_share) / finished_share if finished_share > LEAST_SHARE_FOR_ESTIMATE else None
+    )
 
 
-def _time_left_text(seconds: float | None, elapsed_seconds: float) -> str:
+def _time_left_text(remaining_seconds: float | None, elapsed_seconds: float) -> str:
     """Text of the remaining time or, if it is unknown, of the elapsed time."""
-    return f"{_duration_text(elapsed_seconds)} so far" if seconds is None else f"{_duration_text(seconds)} left"
+    return (
+        f"{_duration_text(elapsed_seconds)} so far"
+        if remaining_seconds is None
+        else f"{_duration_text(remaining_seconds)} left"
+    )
 
 
 def _duration_text(seconds: float) -> str:
@@ -136,7 +147,7 @@ def _duration_text(seconds: float) -> str:
 
 
 @contextmanager
-def progress_bar(text: str, system: str = "") -> Iterator[ReportProgress]:
+def progress_bar(task_text: str, system_name: str = "") -> Iterator[ReportProgress]:
     """Context that shows a progress bar on the terminal if its block takes longer than BAR_DELAY; it yields the
     function that reports progress.
 
@@ -145,7 +156,7 @@ def progress_bar(text: str, system: str = "") -> Iterator[ReportProgress]:
     if not sys.stderr.isatty():
         yield lambda text, share: None
         return
-    waiting, is_over = ProgressState(text, system), threading.Event()
+    waiting, is_over = ProgressState(task_text, system_name), threading.Event()
     thread = threading.Thread(target=_draw_bar, args=(waiting, is_over), daemon=True)
     thread.start()
     try:
@@ -156,9 +167,9 @@ def progress_bar(text: str, system: str = "") -> Iterator[ReportProgress]:
         waiting.compilations.detach()
 
 
-def _draw_bar(progress_state: ProgressState, finished: threading.Event) -> None:
-    """Draw the progress bar from BAR_DELAY on until ``finished`` is set."""
-    while not finished.wait(BAR_PERIOD):
+def _draw_bar(progress_state: ProgressState, finished_event: threading.Event) -> None:
+    """Draw the progress bar from BAR_DELAY on until ``finished_event`` is set."""
+    while not finished_event.wait(BAR_PERIOD):
         progress_state.compilations.attach()
         progress_state.state()  # which sees when a march begins
         if time.monotonic() - progress_state.start_time > BAR_DELAY:
@@ -171,11 +182,11 @@ def _draw_bar(progress_state: ProgressState, finished: threading.Event) -> None:
     columns = TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.fields[left]}")
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False) as bar:
-        task = bar.add_task(progress_state.text, total=None, left="")
+        task = bar.add_task(progress_state.task_text, total=None, left="")
         while True:
             progress_state.compilations.attach()
             text, share, left = progress_state.state()
             total = None if share is None else 1.0
             bar.update(task, description=text, total=total, completed=share or 0.0, left=left)
-            if finished.wait(BAR_PERIOD):
+            if finished_event.wait(BAR_PERIOD):
                 return

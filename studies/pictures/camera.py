@@ -41,58 +41,77 @@ class Camera:
         right /= np.linalg.norm(right)
         return np.array([right, np.cross(back, right), back])
 
-    def pixels(self, picture_height: int) -> float:
+    def pixels_per_metre(self, picture_height: int) -> float:
         """Pixels per metre at the camera's target, in a picture of a height in pixels."""
         return picture_height / (
             2.0 * np.tan(self.angle_of_view / 2.0) * float(np.linalg.norm(np.subtract(self.eye, self.target)))
         )
 
-    def horizon(self, picture_height: int) -> float:
+    def horizon_row(self, picture_height: int) -> float:
         """Row (pixels from the top) of the horizon in a picture of a height in pixels; negative if it lies above the
         picture."""
         _, upright, back = self.axes
         level = float(np.dot(back, self.up) / np.dot(upright, self.up))
         return picture_height / 2.0 * (1.0 - level / np.tan(self.angle_of_view / 2.0))
 
-    def projected(self, points: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+    def projected_points(
+        self, points: np.ndarray, picture_width: int, picture_height: int
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Pixels (..., 2) of points (..., 3) in m, and inverse distances (...) in 1/m along the camera's axis; these
         are negative for points behind the camera."""
         in_camera_axes = (points - self.eye) @ self.axes.T
         near = -1.0 / in_camera_axes[..., 2]
-        scale = height / (2.0 * np.tan(self.angle_of_view / 2.0)) * near
+        scale = picture_height / (2.0 * np.tan(self.angle_of_view / 2.0)) * near
         return np.stack(
-            [width / 2.0 + scale * in_camera_axes[..., 0], height / 2.0 - scale * in_camera_axes[..., 1]], -1
+            [
+                picture_width / 2.0 + scale * in_camera_axes[..., 0],
+                picture_height / 2.0 - scale * in_camera_axes[..., 1],
+            ],
+            -1,
         ), near
 
 
 def painted_picture(
-    camera: Camera, layers: list[list[PaintedSurface]], width: int, height: int, sky_colours: np.ndarray
+    camera: Camera,
+    surface_layers: list[list[PaintedSurface]],
+    picture_width: int,
+    picture_height: int,
+    sky_colours: np.ndarray,
 ) -> np.ndarray:
     """Image (height, width, 3) of surfaces in front of a sky; sky_colours (2, 3) : its colours at the top of the
     picture and at the horizon.
 
     A later layer lies over all earlier ones, as arrows over bodies do.
     """
-    height_share = np.clip(np.arange(2 * height) / max(1.0, 2.0 * camera.horizon(height)), 0.0, 1.0)[:, None]
+    height_share = np.clip(
+        np.arange(2 * picture_height) / max(1.0, 2.0 * camera.horizon_row(picture_height)), 0.0, 1.0
+    )[:, None]
     shade = (sky_colours[0] + height_share * (sky_colours[1] - sky_colours[0])).astype(np.float32)
-    image = np.broadcast_to(shade[:, None], (2 * height, 2 * width, 3)).copy()
-    for layer in layers:
+    image = np.broadcast_to(shade[:, None], (2 * picture_height, 2 * picture_width, 3)).copy()
+    for layer in surface_layers:
         inverse_depths = np.zeros(image.shape[:2], np.float32)
         solid = [surface for surface in layer if surface.alpha == 1.0]
         if solid:
-            paint(*_shaded_triangles(camera, solid, width, height, sky_colours[1]), image, inverse_depths)
+            paint_triangles(
+                *_shaded_triangles(camera, solid, picture_width, picture_height, sky_colours[1]), image, inverse_depths
+            )
         for surface in (surface for surface in layer if surface.alpha < 1.0):
             veil, front = image.copy(), inverse_depths.copy()
-            paint(*_shaded_triangles(camera, [surface], width, height, sky_colours[1]), veil, front)
+            paint_triangles(
+                *_shaded_triangles(camera, [surface], picture_width, picture_height, sky_colours[1]), veil, front
+            )
             image += np.float32(surface.alpha) * (veil - image)
     return (image[::2, ::2] + image[1::2, ::2] + image[::2, 1::2] + image[1::2, 1::2]) / 4.0  # smooth edges
 
 
 def _shaded_triangles(
-    camera: Camera, surfaces: list[PaintedSurface], width: int, height: int, haze_colour: np.ndarray
+    camera: Camera, surfaces: list[PaintedSurface], picture_width: int, picture_height: int, haze_colour: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners, inverse distances and colours, as ``paint`` takes them, of the triangles in front of the camera."""
-    corners, near = camera.projected(np.concatenate([surface.corners for surface in surfaces]), 2 * width, 2 * height)
+    """Corners, inverse distances and colours, as ``paint_triangles`` takes them, of the triangles in front of the
+    camera."""
+    corners, near = camera.projected_points(
+        np.concatenate([surface.corners for surface in surfaces]), 2 * picture_width, 2 * picture_height
+    )
     normals = np.concatenate([surface.normals for surface in surfaces])
     sizes = [len(surface.corners) for surface in surfaces]
     colours = np.repeat([surface.colour for surface in surfaces], sizes, axis=0)
@@ -108,19 +127,19 @@ def _shaded_triangles(
 
 
 @njit(cache=True, error_model="numpy")
-def columns_within(start_value, growth, left_column, right_column):
+def columns_with_positive_value(start_value, growth_per_column, left_column, right_column):
     """First and last column between ``left_column`` and ``right_column`` for which start_value + column * growth is not
     negative; the first is greater than the last if there is no such column.
     """
-    if growth > 0.0:
-        return max(left_column, -start_value / growth), right_column
-    if growth < 0.0:
-        return left_column, min(right_column, -start_value / growth)
+    if growth_per_column > 0.0:
+        return max(left_column, -start_value / growth_per_column), right_column
+    if growth_per_column < 0.0:
+        return left_column, min(right_column, -start_value / growth_per_column)
     return left_column, right_column if start_value >= 0.0 else left_column - 1.0
 
 
 @njit(cache=True, error_model="numpy")
-def paint(corners, inverse_distances, colours, image, inverse_depths):
+def paint_triangles(corners, inverse_distances, colours, image, inverse_depths):
     """Paint triangles into ``image`` (h, w, 3), at pixels where the triangle is nearer to the camera than the surface
     recorded in ``inverse_depths`` (h, w), in 1/m.
 
@@ -140,9 +159,11 @@ def paint(corners, inverse_distances, colours, image, inverse_depths):
             # Shares of corners 1 and 2 at column 0, and their growth from column to column.
             first, one_on = (-x0 * (y2 - y0) - (x2 - x0) * (row - y0)) / area, (y2 - y0) / area
             weight_of_second, two_on = ((x1 - x0) * (row - y0) + x0 * (y1 - y0)) / area, -(y1 - y0) / area
-            left, right = columns_within(first, one_on, max(0.0, min(x0, x1, x2)), min(width - 1.0, max(x0, x1, x2)))
-            left, right = columns_within(weight_of_second, two_on, left, right)
-            left, right = columns_within(1.0 - first - weight_of_second, -one_on - two_on, left, right)
+            left, right = columns_with_positive_value(
+                first, one_on, max(0.0, min(x0, x1, x2)), min(width - 1.0, max(x0, x1, x2))
+            )
+            left, right = columns_with_positive_value(weight_of_second, two_on, left, right)
+            left, right = columns_with_positive_value(1.0 - first - weight_of_second, -one_on - two_on, left, right)
             for column in range(math.ceil(left), math.floor(right) + 1):
                 b, c = first + column * one_on, weight_of_second + column * two_on
                 a = 1.0 - b - c

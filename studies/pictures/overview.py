@@ -48,28 +48,28 @@ CURVE_STYLES = {"reference": ("-", 3.2), "exudyn": ("-", 1.5), "mujoco": (":", 1
 """Line style and width of each engine's curve, by which coinciding curves are seen."""
 
 
-def draw(path: Path) -> Path:
+def draw_overview_picture(picture_path: Path) -> Path:
     """Run the scene in all implementations and save the overview picture; returns its path."""
-    runs = {engine: _run(engine, method, 1e-3) for engine, method in RUNGE_KUTTA.items()}
+    runs = {engine: _run_of_engine(engine, method, 1e-3) for engine, method in RUNGE_KUTTA.items()}
     figure, axes = subplot_mosaic(
         [["idea", "idea", "idea"], ["force", "gap", "price"]], figsize=(COLUMN_WIDTH, 4.5), height_ratios=(1, 1.5)
     )
     _draw_overview(axes["idea"])
     _plot_forces(axes["force"], runs)
     _plot_differences(axes["gap"], runs)
-    _plot_prices(axes["price"])
+    _plot_errors_over_calls(axes["price"])
     add_heading(figure, "twinrig: one vehicle in two engines and by hand, each result with its error and its price")
-    return save(figure, path)
+    return save(figure, picture_path)
 
 
-def _run(engine: str, method: str, step: float) -> Result:
+def _run_of_engine(engine: str, integrator: str, time_step: float) -> Result:
     """Result of the scene in an engine by a method with a step (s)."""
-    scene = build(SCENE | {"engines": {engine: {"integrator": method, "step": step}}})
+    scene = build(SCENE | {"engines": {engine: {"integrator": integrator, "step": time_step}}})
     return run(scene, engine)
 
 
-def _plot_forces(axis: Any, runs: dict[str, Result]) -> None:
-    for engine, result in runs.items():
+def _plot_forces(axis: Any, runs_by_engine: dict[str, Result]) -> None:
+    for engine, result in runs_by_engine.items():
         line, width = CURVE_STYLES[engine]
         axis.plot(
             result.times,
@@ -82,13 +82,15 @@ def _plot_forces(axis: Any, runs: dict[str, Result]) -> None:
     axis.set(xlabel="time [s]", title="The same force [kN] ...", xlim=(0.0, DURATION))
 
 
-def _plot_differences(axis: Any, runs: dict[str, Result]) -> None:
+def _plot_differences(axis: Any, runs_by_engine: dict[str, Result]) -> None:
     """Plot the largest difference of each engine's force from the reference up to each time, divided by the largest
     force."""
-    reference = runs["reference"]
+    reference = runs_by_engine["reference"]
     largest = np.abs(reference[COMPARED_FORCE]).max()
     for engine in ("exudyn", "mujoco"):
-        gap = np.maximum.accumulate(np.abs(runs[engine][COMPARED_FORCE] - reference[COMPARED_FORCE])) / largest
+        gap = (
+            np.maximum.accumulate(np.abs(runs_by_engine[engine][COMPARED_FORCE] - reference[COMPARED_FORCE])) / largest
+        )
         axis.semilogy(reference.times, np.maximum(gap, 1e-18), color=COLOURS[engine], linewidth=1.6)
     digits = math.floor(-math.log10(max(line.get_ydata()[-1] for line in axis.lines)))
     axis.axhline(1e-2, color=DARK, linestyle=":")
@@ -98,31 +100,31 @@ def _plot_differences(axis: Any, runs: dict[str, Result]) -> None:
     )
 
 
-def _plot_prices(axis: Any) -> None:
+def _plot_errors_over_calls(axis: Any) -> None:
     """Plot the relative error of the force over the number of force calls: of the classical Runge-Kutta method, and of
     each engine's default solver."""
-    truth = _run("reference", "RK4", REFERENCE_STEP)
+    truth = _run_of_engine("reference", "RK4", REFERENCE_STEP)
     curves = {engine: (method, f"{LABELS[engine]}, {name}") for engine, (method, name, _) in ENGINE_DEFAULTS.items()}
     curves |= {"reference": ("RK4", "Runge-Kutta, all three")}
     for engine, (method, name) in curves.items():
-        points = [_calls_and_error(_run(engine, method, step), truth, step) for step in STABLE_STEPS[engine]]
+        points = [_calls_and_error(_run_of_engine(engine, method, step), truth, step) for step in STABLE_STEPS[engine]]
         calls, errors = zip(*points, strict=True)
         axis.loglog(calls, errors, "o-", color=COLOURS[engine], markersize=3.5)
         axis.text(1.4 * calls[-1], errors[-1], name, color=COLOURS[engine], va="center", fontsize=SMALL_TEXT)
     for engine, (method, _, step) in ENGINE_DEFAULTS.items():
-        calls_and_error = _calls_and_error(_run(engine, method, step), truth, step)
+        calls_and_error = _calls_and_error(_run_of_engine(engine, method, step), truth, step)
         axis.plot(*calls_and_error, "o", markersize=10, markerfacecolor="none", color=COLOURS[engine])
     axis.set(xlabel="work: force calls [-] (ring: usual step)", xlim=(4e2, 4e6), title="What accuracy costs: error [-]")
 
 
-def _calls_and_error(result: Result, truth: Result, step: float) -> tuple[float, float]:
+def _calls_and_error(engine_run: Result, reference_run: Result, time_step: float) -> tuple[float, float]:
     """Number of force calls of a run, and largest error of its force at common times divided by the largest force."""
-    rows, fine = round(COMPARISON_SPACING / step), round(COMPARISON_SPACING / REFERENCE_STEP)
+    rows, fine = round(COMPARISON_SPACING / time_step), round(COMPARISON_SPACING / REFERENCE_STEP)
     error = (
-        np.abs(result[COMPARED_FORCE][::rows] - truth[COMPARED_FORCE][::fine]).max()
-        / np.abs(truth[COMPARED_FORCE]).max()
+        np.abs(engine_run[COMPARED_FORCE][::rows] - reference_run[COMPARED_FORCE][::fine]).max()
+        / np.abs(reference_run[COMPARED_FORCE]).max()
     )
-    return float(result.counts()["force calls"]), float(error)
+    return float(engine_run.counts()["force calls"]), float(error)
 
 
 def _draw_overview(axis: Any) -> None:
@@ -155,13 +157,15 @@ def _draw_arrow(axis: Any, start_point: tuple[float, float], end_point: tuple[fl
 
 
 def _draw_box(
-    axis: Any, centre: tuple[float, float], box_width: float, text: str, colour: str, high: float = 0.95
+    axis: Any, centre: tuple[float, float], box_width: float, text: str, colour: str, box_height: float = 0.95
 ) -> None:
-    corner = centre[0] - box_width / 2, centre[1] - high / 2
-    shape = FancyBboxPatch(corner, box_width, high, boxstyle="round,pad=0.08", facecolor="white", edgecolor=colour)
+    corner = centre[0] - box_width / 2, centre[1] - box_height / 2
+    shape = FancyBboxPatch(
+        corner, box_width, box_height, boxstyle="round,pad=0.08", facecolor="white", edgecolor=colour
+    )
     axis.add_patch(shape)
     axis.text(*centre, text, color=colour, ha="center", va="center", fontsize=9, fontweight="bold")
 
 
 if __name__ == "__main__":
-    draw(Path(sys.argv[1]))
+    draw_overview_picture(Path(sys.argv[1]))

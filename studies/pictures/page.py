@@ -14,7 +14,7 @@ from matplotlib.transforms import IdentityTransform
 
 from models.drawing.figures import COLOURS, DARK, GREY, LABELS, ORANGE, PINK, SKY
 from studies.pictures.drawing import draw_frame
-from studies.pictures.film import FilmedMotion, Stage, largest_differences
+from studies.pictures.film import FilmedMotion, FilmStage, largest_motion_differences
 
 PAGE_WIDTH, PAGE_HEIGHT = 1280, 720
 PAGE_MARGIN, TITLE_HEIGHT, PICTURE_HEIGHT = 12, 66, 400
@@ -29,16 +29,20 @@ FONT_SIZES: dict[Any, Any] = {
 """Font sizes (points) that are readable if the page is shown as wide as other figures."""
 
 
-class Page:
+class FilmPage:
     """Page of 1280 x 720 pixels on which the frames of filmed motions are drawn one after the other."""
 
-    def __init__(self, stage: Stage, motions: list[FilmedMotion]) -> None:
-        self.stage, self.motions = stage, motions
-        self._wide = (PAGE_WIDTH - PAGE_MARGIN * (len(motions) + 1)) // len(motions)
-        self._lefts = [PAGE_MARGIN + i * (self._wide + PAGE_MARGIN) for i in range(len(motions))]
+    def __init__(self, film_stage: FilmStage, filmed_motions: list[FilmedMotion]) -> None:
+        self.stage, self.motions = film_stage, filmed_motions
+        self._wide = (PAGE_WIDTH - PAGE_MARGIN * (len(filmed_motions) + 1)) // len(filmed_motions)
+        self._lefts = [PAGE_MARGIN + i * (self._wide + PAGE_MARGIN) for i in range(len(filmed_motions))]
         self._forces = [
-            [arrow.vectors @ stage.curve.direction / 1e3 for arrow in motion.arrows if arrow.kind == stage.curve.kind]
-            for motion in motions
+            [
+                arrow.vectors @ film_stage.force_curve.direction / 1e3
+                for arrow in motion.arrows
+                if arrow.kind == film_stage.force_curve.kind
+            ]
+            for motion in filmed_motions
         ]
         with rc_context(FONT_SIZES):
             self._draw()
@@ -79,7 +83,7 @@ class Page:
         page = np.asarray(canvas.buffer_rgba())[..., :3].copy()
         for left, motion in zip(self._lefts, self.motions, strict=True):
             image = draw_frame(motion, self.stage, frame_number, self._wide, PICTURE_HEIGHT)
-            page[TITLE_HEIGHT : TITLE_HEIGHT + PICTURE_HEIGHT, left : left + self._wide] = eight_bits(image)
+            page[TITLE_HEIGHT : TITLE_HEIGHT + PICTURE_HEIGHT, left : left + self._wide] = eight_bit_image(image)
         return page
 
     def frame_of_largest_force(self) -> int:
@@ -91,7 +95,7 @@ class Page:
         and the stage's caption."""
         row, left = 1 - (TITLE_HEIGHT + PICTURE_HEIGHT + 20) / PAGE_HEIGHT, float(PAGE_MARGIN)
         for name, kind in self.stage.arrow_styles.items():
-            length = kind.scale * kind.legend * self.stage.camera.pixels(PICTURE_HEIGHT)
+            length = kind.scale * kind.legend * self.stage.camera.pixels_per_metre(PICTURE_HEIGHT)
             arrow = FancyArrow(
                 left,
                 row * PAGE_HEIGHT,
@@ -115,7 +119,7 @@ class Page:
     def _draw_curves(self) -> Axes:
         """Draw the plotted forces (kN) over time: lines for the first engine, dots for the others; returns the axes."""
         axes = self._figure.add_axes((70 / PAGE_WIDTH, 62 / PAGE_HEIGHT, 1 - 82 / PAGE_WIDTH, 128 / PAGE_HEIGHT))
-        first, curve = self.motions[0], self.stage.curve
+        first, curve = self.motions[0], self.stage.force_curve
         names = [arrow.name.rpartition(", ")[2] for arrow in first.arrows if arrow.kind == curve.kind]
         film_times, stride = first.times, max(1, len(first.times) // 60)
         for name, values, tone in zip(names, self._forces[0], cycle(CURVE_COLOURS)):
@@ -127,7 +131,7 @@ class Page:
         axes.set_ylabel(f"{curve.kind} [kN]")
         marks = ": lines {}, dots {}" if len(self.motions) > 1 else ""
         labels = (LABELS[motion.engine] for motion in self.motions)
-        axes.set_title(f"{curve.kind.capitalize()} {curve.meaning}" + marks.format(*labels))
+        axes.set_title(f"{curve.kind.capitalize()} {curve.direction_text}" + marks.format(*labels))
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(names))
         self._figure.text(1 - PAGE_MARGIN / PAGE_WIDTH, 12 / PAGE_HEIGHT, difference_sentence(self.motions), ha="right")
         self._figure.text(70 / PAGE_WIDTH, 12 / PAGE_HEIGHT, "time [s]")
@@ -138,17 +142,17 @@ CURVE_COLOURS = (DARK, PINK, ORANGE, SKY, GREY)
 """Colours of the force curves, which differ from the engines' colours."""
 
 
-def difference_sentence(motions: list[FilmedMotion]) -> str:
+def difference_sentence(filmed_motions: list[FilmedMotion]) -> str:
     """Sentence on the largest differences between two engines over the film; with a single engine, its name."""
-    if len(motions) == 1:
-        return f"poses as {LABELS[motions[0].engine]} reports them"
-    position_gap, turns, forces = largest_differences(*motions)
+    if len(filmed_motions) == 1:
+        return f"poses as {LABELS[filmed_motions[0].engine]} reports them"
+    position_gap, turns, forces = largest_motion_differences(*filmed_motions)
     return (
         "poses as each engine reports them; largest difference over the film: "
         f"places {position_gap:.1e} m, rotations {turns:.1e} rad, forces {forces:.1e} N"
     )
 
 
-def eight_bits(image: np.ndarray) -> np.ndarray:
+def eight_bit_image(image: np.ndarray) -> np.ndarray:
     """Image with colours from 0 to 1, converted to bytes from 0 to 255."""
     return (255.0 * image.clip(0.0, 1.0) + 0.5).astype(np.uint8)

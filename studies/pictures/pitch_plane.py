@@ -13,21 +13,21 @@ from models.systems.pitch_plane.scene import build as scene_of
 from models.vehicles.pitch_plane import equilibrium
 from studies.pictures.camera import Camera
 from studies.pictures.film import (
-    Arrow,
     ArrowStyle,
+    DrawnRod,
     FilmedMotion,
+    FilmStage,
+    ForceArrow,
     ForceCurve,
     Poses,
-    Stage,
-    Strut,
     exudyn_poses,
     mujoco_poses,
 )
-from studies.pictures.road import DRAWN_ROAD, PassingRoad
+from studies.pictures.road import DRAWN_ROAD_LENGTH, PassingRoad
 from studies.pictures.shapes import PAINT_COLOUR, PaintedSurface, box, tyred_wheel
 
 SPEED, SEED = 15.0, 1
-MAGNIFICATION = 3.0
+MOTION_MAGNIFICATION = 3.0
 WHEEL_RADIUS, CHASSIS_HEIGHT = 0.33, 0.95
 """Drawn wheel radius (m) and height (m) of the chassis' centre above the road, which the model does not have."""
 ARROW_STYLES = {
@@ -39,9 +39,11 @@ EXUDYN_AXES = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 """Directions of Exudyn's axes as columns: backward, down, to the right."""
 
 
-def stage_and_motions(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[FilmedMotion]]:
-    """Stage of the film, and the motion by each engine, with frames at the steps nearest to ``times`` (s)."""
-    run = {"duration": float(np.ceil(duration + DRAWN_ROAD / SPEED)), "step": 1e-3}
+def stage_and_motions(
+    duration: float, frame_times: np.ndarray, engines: tuple[str, ...]
+) -> tuple[FilmStage, list[FilmedMotion]]:
+    """Stage of the film, and the motion by each engine, with frames at the steps nearest to ``frame_times`` (s)."""
+    run = {"duration": float(np.ceil(duration + DRAWN_ROAD_LENGTH / SPEED)), "step": 1e-3}
     scene = scene_of(
         {
             "title": "pitch plane",
@@ -50,37 +52,39 @@ def stage_and_motions(duration: float, times: np.ndarray, engines: tuple[str, ..
         }
     )
     assembly = assembly_of_scene(scene)
-    runs = [_motion_of_engine(engine, assembly, times) for engine in engines]
+    runs = [_motion_of_engine(engine, assembly, frame_times) for engine in engines]
     return stage(assembly, runs[0][1]), [motion for motion, _ in runs]
 
 
-def _motion_of_engine(engine: str, assembly: Assembly, times: np.ndarray) -> tuple[FilmedMotion, Channels]:
+def _motion_of_engine(engine: str, assembly: Assembly, frame_times: np.ndarray) -> tuple[FilmedMotion, Channels]:
     model: Any = build(engine, assembly, settings_of(assembly.scene, engine))
     run = model.run()
     channels = output_channels(assembly, run)
-    rows = np.rint(times / (run.times[1] - run.times[0])).astype(int)
+    rows = np.rint(frame_times / (run.times[1] - run.times[0])).astype(int)
     positions, turns = (_exudyn_poses if engine == "exudyn" else _mujoco_poses)(model, run.states[rows, :4])
     poses = {name: position + _body_offset(assembly, name) for name, position in positions.items()}, turns
-    return FilmedMotion(engine, run.times[rows], *poses, arrows(assembly, channels, rows, poses)), channels
+    return FilmedMotion(engine, run.times[rows], *poses, force_arrows(assembly, channels, rows, poses)), channels
 
 
-def _mujoco_poses(model: Any, states: np.ndarray) -> Poses:
-    names = [body.name for body in model.assembly.vehicle.bodies]
-    positions, turns = mujoco_poses(model.model, {name: model.model.body(name).id for name in names}, states)
+def _mujoco_poses(engine_model: Any, states: np.ndarray) -> Poses:
+    names = [body.name for body in engine_model.assembly.vehicle.bodies]
+    positions, turns = mujoco_poses(
+        engine_model.model, {name: engine_model.model.body(name).id for name in names}, states
+    )
     return {name: position * [0.0, 1.0, 1.0] for name, position in positions.items()}, turns
 
 
-def _exudyn_poses(model: Any, states: np.ndarray) -> Poses:
+def _exudyn_poses(engine_model: Any, states: np.ndarray) -> Poses:
     """Poses of the bodies by Exudyn, from the coordinates (f, 4) of the states in f frames; wheels are point masses
     without rotation."""
     import exudyn as exu
 
-    mbs, nodes = model.built.mbs, model.built.nodes
+    mbs, nodes = engine_model.built.mbs, engine_model.built.nodes
 
-    def ask(node: Any, output_kind: Any) -> Any:
-        point = mbs.GetNode(node)["nodeType"] == "Point2D"
+    def ask(exudyn_node: Any, output_kind: Any) -> Any:
+        point = mbs.GetNode(exudyn_node)["nodeType"] == "Point2D"
         asks_rotation = output_kind == exu.OutputVariableType.RotationMatrix
-        return np.eye(3) if point and asks_rotation else mbs.GetNodeOutput(node, output_kind)
+        return np.eye(3) if point and asks_rotation else mbs.GetNodeOutput(exudyn_node, output_kind)
 
     coordinates = np.zeros((len(states), 7))
     coordinates[:, [1, 3, 5, 6]] = states
@@ -91,55 +95,64 @@ def _exudyn_poses(model: Any, states: np.ndarray) -> Poses:
     )
 
 
-def _body_offset(assembly: Assembly, body: str) -> np.ndarray:
+def _body_offset(assembly: Assembly, body_name: str) -> np.ndarray:
     """Position (3,) in m at which a body is drawn if its coordinates are zero; the model has neither longitudinal
     positions nor heights."""
-    x = {axle.wheel: axle.x for axle in assembly.vehicle.axles}.get(body)
+    x = {axle.wheel: axle.x for axle in assembly.vehicle.axles}.get(body_name)
     return np.array([0.0, 0.0, -CHASSIS_HEIGHT]) if x is None else np.array([x, 0.0, -WHEEL_RADIUS])
 
 
-def arrows(assembly: Assembly, channels: Channels, rows: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
-    """Force arrows of the road on the wheels and of the suspension on the chassis, in the frames ``rows`` of a run."""
-    upward, (positions, turns), arrows_drawn = np.array([0.0, 0.0, -1.0]), poses, []
+def force_arrows(
+    assembly: Assembly, run_channels: Channels, frame_rows: np.ndarray, body_poses: Poses
+) -> tuple[ForceArrow, ...]:
+    """Force arrows of the road on the wheels and of the suspension on the chassis, in the frames ``frame_rows`` of a
+    run."""
+    upward, (positions, turns), arrows_drawn = np.array([0.0, 0.0, -1.0]), body_poses, []
     for axle, wheel, strut in zip(assembly.vehicle.axles, ("f1", "f2"), ("f3", "f4"), strict=True):
         road, mount = np.array([0.0, 0.0, WHEEL_RADIUS]), np.array([axle.x, 0.0, 0.0])
-        on_wheel, on_chassis = (channels[name][2][rows, None] * upward for name in (wheel, strut))
+        on_wheel, on_chassis = (run_channels[name][2][frame_rows, None] * upward for name in (wheel, strut))
         mounts = positions["chassis"] + turns["chassis"] @ mount
         arrows_drawn.append(
-            Arrow(f"wheel force, {axle.name}", "wheel force", axle.wheel, positions[axle.wheel] + road, on_wheel)
+            ForceArrow(f"wheel force, {axle.name}", "wheel force", axle.wheel, positions[axle.wheel] + road, on_wheel)
         )
-        arrows_drawn.append(Arrow(f"suspension force, {axle.name}", "suspension force", "chassis", mounts, on_chassis))
+        arrows_drawn.append(
+            ForceArrow(f"suspension force, {axle.name}", "suspension force", "chassis", mounts, on_chassis)
+        )
     return tuple(arrows_drawn)
 
 
-def stage(assembly: Assembly, channels: Channels) -> Stage:
+def stage(assembly: Assembly, run_channels: Channels) -> FilmStage:
     """Stage of the film: the vehicle, seen from its right, on a passing road; z down."""
-    height = channels["zeta1"][2]
+    height = run_channels["zeta1"][2]
     distances = assembly.vehicle.axles[0].x + SPEED * np.linspace(0.0, assembly.scene.run.duration, len(height))
-    road = PassingRoad(distances, np.column_stack([height, height]), (-1.0, 1.0), SPEED, -1.0, MAGNIFICATION, 1.0)
+    road = PassingRoad(
+        distances, np.column_stack([height, height]), (-1.0, 1.0), SPEED, -1.0, MOTION_MAGNIFICATION, 1.0
+    )
     level = equilibrium(assembly.parameters, assembly.vehicle.geometry)
     names = [body.name for body in assembly.vehicle.bodies]
     rest_positions = {
         name: _body_offset(assembly, name) + np.array([0.0, 0.0, level[i]]) for i, name in enumerate(names)
     }
-    struts = tuple(Strut("chassis", (axle.x, 0.0, 0.0), axle.wheel, (0.0, 0.0, 0.0)) for axle in assembly.vehicle.axles)
-    caption = f"displacements and road drawn {MAGNIFICATION:g} times as large; forces on wheels and chassis"
+    struts = tuple(
+        DrawnRod("chassis", (axle.x, 0.0, 0.0), axle.wheel, (0.0, 0.0, 0.0)) for axle in assembly.vehicle.axles
+    )
+    caption = f"displacements and road drawn {MOTION_MAGNIFICATION:g} times as large; forces on wheels and chassis"
     camera = Camera((1.5, 4.6, -1.5), (0.0, 0.0, -0.66), (0.0, 0.0, -1.0), 0.46)
-    return Stage(
+    return FilmStage(
         f"Pitch-plane vehicle at {SPEED:g} m/s on a road of class D",
         caption,
-        shapes(assembly),
+        body_shapes(assembly),
         rest_positions,
         camera,
         ARROW_STYLES,
         FORCE_CURVE,
-        road.at,
-        MAGNIFICATION,
-        struts=struts,
+        road.surfaces_at,
+        MOTION_MAGNIFICATION,
+        drawn_rods=struts,
     )
 
 
-def shapes(assembly: Assembly) -> dict[str, list[PaintedSurface]]:
+def body_shapes(assembly: Assembly) -> dict[str, list[PaintedSurface]]:
     """Drawn shapes by body: a beam for the chassis, and two wheels."""
     p = assembly.parameters
     beam = box(p.a + p.b + 0.5, 0.5, 0.14, PAINT_COLOUR).at((p.b - p.a) / 2.0, 0.0, -0.07)

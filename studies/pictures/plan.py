@@ -11,8 +11,8 @@ def check(scene: PictureScene, engines: tuple[str, ...]) -> None:
 def describe(scene: PictureScene) -> str:
     """Text for ``twinrig show``: vehicle, film and format of a scene of pictures."""
     film = scene.film
-    long = film.frames / film.frames_per_second
-    shown = f"{film.duration:g} s of the run in {film.frames} frames, {long:g} s of film"
+    long = film.frame_count / film.frames_per_second
+    shown = f"{film.duration:g} s of the run in {film.frame_count} frames, {long:g} s of film"
     lines = [
         scene.title,
         f"  scene      {scene.file}, study {scene.study}",

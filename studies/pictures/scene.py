@@ -11,26 +11,26 @@ from models.core.errors import InputError
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict
 
-MOST_FRAMES = 3000
+FRAME_LIMIT = 3000
 """Largest number of frames: two minutes of film; drawing a frame takes a fifth of a second."""
-LONGEST_RUN = 120.0
+LONGEST_RUN_DURATION = 120.0
 """Longest run (s): all its steps are computed, however few frames show it."""
 
 
-class Film(Strict):
+class FilmTable(Strict):
     """[film]: how long a run is shown, and how."""
 
-    duration: float = Field(gt=0, le=LONGEST_RUN, description="s of the run that are shown")
+    duration: float = Field(gt=0, le=LONGEST_RUN_DURATION, description="s of the run that are shown")
     slow_motion: float = Field(default=1.0, gt=0, le=1000, description="seconds of film per second of the run")
     frames_per_second: int = Field(default=25, ge=1, le=60, description="of the film")
     format: Literal["mp4", "gif", "png"] = Field(default="mp4", description="png: stills only")
 
-    def times(self) -> np.ndarray:
+    def frame_times(self) -> np.ndarray:
         """Times (s) of the frames within the run, the first one at 0."""
-        return np.arange(self.frames) / (self.slow_motion * self.frames_per_second)
+        return np.arange(self.frame_count) / (self.slow_motion * self.frames_per_second)
 
     @property
-    def frames(self) -> int:
+    def frame_count(self) -> int:
         """Number of frames of the film."""
         return max(1, round(self.duration * self.slow_motion * self.frames_per_second))
 
@@ -41,16 +41,16 @@ class PictureScene(SceneFile):
     system: Literal["pictures"] = "pictures"
     study: str = Field(default="animation", description="the study that runs the scene")
     vehicle: Literal["wheelset", "pitch_plane", "r19_free"] = Field(description="what is drawn")
-    film: Film
+    film: FilmTable
 
 
-def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> PictureScene:
+def build(scene_table: Mapping[str, Any], scene_file: str = "", scene_folder: Path = Path()) -> PictureScene:
     """Checked scene of pictures from nested tables; raises InputError for anything that is not understood."""
-    scene = checked(PictureScene, table, file, folder)
-    if scene.film.frames > MOST_FRAMES:
+    scene = checked(PictureScene, scene_table, scene_file, scene_folder)
+    if scene.film.frame_count > FRAME_LIMIT:
         allowed = (
-            f"makes {scene.film.frames} frames (duration x slow motion x frames per second) where at most "
-            f"{MOST_FRAMES} are drawn: show less of the run"
+            f"makes {scene.film.frame_count} frames (duration x slow motion x frames per second) where at most "
+            f"{FRAME_LIMIT} are drawn: show less of the run"
         )
-        raise InputError(file, "film.duration", scene.film.duration, allowed)
+        raise InputError(scene_file, "film.duration", scene.film.duration, allowed)
     return scene

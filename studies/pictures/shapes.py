@@ -26,13 +26,13 @@ class PaintedSurface:
     colour: Colour
     alpha: float = 1.0
 
-    def moved(self, shift: np.ndarray, rotation: np.ndarray) -> "PaintedSurface":
-        """The surface rotated by ``rotation`` (3, 3) and then shifted by ``shift`` (3,) in m."""
-        return replace(self, corners=self.corners @ rotation.T + shift, normals=self.normals @ rotation.T)
+    def rotated_and_shifted(self, displacement: np.ndarray, rotation: np.ndarray) -> "PaintedSurface":
+        """The surface rotated by ``rotation`` (3, 3) and then shifted by ``displacement`` (3,) in m."""
+        return replace(self, corners=self.corners @ rotation.T + displacement, normals=self.normals @ rotation.T)
 
-    def at(self, *shift: float) -> "PaintedSurface":
+    def at(self, *displacement: float) -> "PaintedSurface":
         """The surface shifted by x, y, z (m)."""
-        return replace(self, corners=self.corners + np.array(shift))
+        return replace(self, corners=self.corners + np.array(displacement))
 
 
 def flat_surface(corners: np.ndarray, colour: Colour) -> PaintedSurface:
@@ -43,9 +43,14 @@ def flat_surface(corners: np.ndarray, colour: Colour) -> PaintedSurface:
     return PaintedSurface(corners, np.repeat(normals[:, None], 3, axis=1), colour)
 
 
-def net_triangles(points: np.ndarray) -> np.ndarray:
+def net_triangles(net_points: np.ndarray) -> np.ndarray:
     """Triangles (2 (a - 1)(b - 1), 3, 3) of a net of points (a, b, 3)."""
-    first, second_corner, three, four = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
+    first, second_corner, three, four = (
+        net_points[:-1, :-1],
+        net_points[1:, :-1],
+        net_points[1:, 1:],
+        net_points[:-1, 1:],
+    )
     return np.concatenate(
         [
             np.stack([first, second_corner, three], 2).reshape(-1, 3, 3),
@@ -54,11 +59,13 @@ def net_triangles(points: np.ndarray) -> np.ndarray:
     )
 
 
-def surface_of_revolution(axial: ArrayLike, radii: ArrayLike, colour: Colour, piece_count: int = 48) -> PaintedSurface:
+def surface_of_revolution(
+    axial_positions: ArrayLike, radii: ArrayLike, colour: Colour, segment_count: int = 48
+) -> PaintedSurface:
     """Surface of revolution about y from an outline of positions along y and radii (m), from left to right; it is
     shaded smoothly around the axis, with sharp edges at the outline's corners."""
-    angles = np.linspace(0.0, 2.0 * np.pi, piece_count + 1)
-    y, r = np.array(axial, float), np.array(radii, float)
+    angles = np.linspace(0.0, 2.0 * np.pi, segment_count + 1)
+    y, r = np.array(axial_positions, float), np.array(radii, float)
     ring = np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], 1)
     net = r[:, None, None] * ring + np.stack([0 * y, y, 0 * y], 1)[:, None]
     slopes = np.stack([np.diff(y), -np.diff(r)], 1)
@@ -98,15 +105,15 @@ def extruded_outline(outline: np.ndarray, width: float, colour: Colour) -> Paint
     return flat_surface(np.concatenate([*fan, net_triangles(closed)]), colour)
 
 
-def floor(z: float, colour: Colour, up: float) -> PaintedSurface:
+def floor(height: float, colour: Colour, up_sign: float) -> PaintedSurface:
     """Surface of a horizontal square about the origin at height z (m); its tiles are small near the origin, because
     tiles that reach behind the camera are not drawn.
 
-    up : 1 if z is up, -1 if it is down.
+    up_sign : 1 if z is up, -1 if it is down.
     """
     lines = FLOOR_DISTANCE * np.sinh(np.linspace(-6.0, 6.0, 57)) / np.sinh(6.0)
-    x, y = np.meshgrid(up * lines, lines, indexing="ij")
-    return flat_surface(net_triangles(np.stack([x, y, np.full_like(x, z)], -1)), colour)
+    x, y = np.meshgrid(up_sign * lines, lines, indexing="ij")
+    return flat_surface(net_triangles(np.stack([x, y, np.full_like(x, height)], -1)), colour)
 
 
 def ball(radius: float, colour: Colour) -> PaintedSurface:
@@ -117,15 +124,15 @@ def ball(radius: float, colour: Colour) -> PaintedSurface:
 
 
 def line_solid(
-    tail_point: np.ndarray, head_point: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour
+    tail_point: np.ndarray, head_point: np.ndarray, axial_positions: np.ndarray, radii: np.ndarray, colour: Colour
 ) -> PaintedSurface:
-    """Surface of revolution about the axis from a point (tail) to another (head); ``axial`` : positions (m) along the
-    axis from the tail; ``radii`` : radii (m) there."""
+    """Surface of revolution about the axis from a point (tail) to another (head); ``axial_positions`` : positions (m)
+    along the axis from the tail; ``radii`` : radii (m) there."""
     direction = (head_point - tail_point) / np.linalg.norm(head_point - tail_point)
     perpendicular = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
     perpendicular /= np.linalg.norm(perpendicular)
     turn = np.column_stack([perpendicular, direction, np.cross(perpendicular, direction)])
-    return surface_of_revolution(axial, radii, colour, 16).moved(tail_point, turn)
+    return surface_of_revolution(axial_positions, radii, colour, 16).rotated_and_shifted(tail_point, turn)
 
 
 def rod(tail_point: np.ndarray, head_point: np.ndarray, radius: float, colour: Colour) -> PaintedSurface:
@@ -136,12 +143,12 @@ def rod(tail_point: np.ndarray, head_point: np.ndarray, radius: float, colour: C
     )
 
 
-def arrow(tail_point: np.ndarray, vector: np.ndarray, thickness: float, colour: Colour) -> PaintedSurface | None:
+def arrow(tail_point: np.ndarray, arrow_vector: np.ndarray, thickness: float, colour: Colour) -> PaintedSurface | None:
     """Surface of an arrow as long as the vector (3,) in m; None if it is shorter than a tenth of its thickness (m)."""
-    length = float(np.linalg.norm(vector))
+    length = float(np.linalg.norm(arrow_vector))
     if length < 0.1 * thickness:
         return None
     head = min(2.6 * thickness, length)
     axial = np.array([0.0, 0.0, length - head, length - head, length])
     radii = thickness * min(1.0, length / (2.6 * thickness)) * np.array([0.0, 0.35, 0.35, 1.0, 0.0])
-    return line_solid(tail_point, tail_point + vector, axial, radii, colour)
+    return line_solid(tail_point, tail_point + arrow_vector, axial, radii, colour)

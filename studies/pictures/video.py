@@ -22,7 +22,7 @@ def missing_extra(format_name: str) -> str:
     )
 
 
-def write(path: Path, frames: Iterable[np.ndarray], frames_per_second: int) -> Path:
+def write(film_path: Path, frame_images: Iterable[np.ndarray], frames_per_second: int) -> Path:
     """Write frames (h, w, 3) with 8 bits per colour to a film file, .mp4 or .gif; returns its path.
     frames_per_second : frames per second of film."""
     import imageio.v2 as imageio
@@ -31,17 +31,17 @@ def write(path: Path, frames: Iterable[np.ndarray], frames_per_second: int) -> P
     mp4: dict[str, Any] = {"fps": frames_per_second, "codec": "libx264", "quality": 7}
     writer: Any
     with (
-        whole_file(path) as partial_path,
-        imageio.get_writer(partial_path, **(gif if path.suffix == ".gif" else mp4)) as writer,
+        whole_file(film_path) as partial_path,
+        imageio.get_writer(partial_path, **(gif if film_path.suffix == ".gif" else mp4)) as writer,
     ):
-        for frame in frames:
+        for frame in frame_images:
             writer.append_data(frame)
-    return path
+    return film_path
 
 
-def write_png(path: Path, image: np.ndarray) -> Path:
+def write_png(picture_path: Path, image: np.ndarray) -> Path:
     """Write an image (h, w, 3) to a PNG file, with equal bytes for equal images; returns its path."""
     metadata: Any = {"Software": None}
-    with whole_file(path) as partial_path:
+    with whole_file(picture_path) as partial_path:
         imsave(partial_path, np.ascontiguousarray(image), metadata=metadata)
-    return path
+    return picture_path

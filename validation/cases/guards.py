@@ -220,7 +220,7 @@ def _wrong_input_rows(engine_name: str) -> list[Row]:
     numbers = nan_force_endings(engine_name)
     caught = {name: "caught" if ended in ("raised", "refused") else ended for name, ended in numbers.items()}
     with TemporaryDirectory() as files_folder:
-        file = run_ending(lambda: sampled_input.damaged_file(engine_name, Path(files_folder)))
+        file = run_ending(lambda: sampled_input.state_from_damaged_file(engine_name, Path(files_folder)))
     return [
         behaviour_row(
             f"guards.nan-file.{engine_name}",
@@ -242,7 +242,7 @@ def _wrong_input_rows(engine_name: str) -> list[Row]:
             f"guards.step-sampling.{engine_name}",
             SYSTEM,
             f"a step that does not divide the sampling period, {engine_name}",
-            run_ending(lambda: sampled_input.uneven_steps(engine_name, Path())),
+            run_ending(lambda: sampled_input.state_with_uneven_steps(engine_name, Path())),
             "refused",
             "a held sample would change in a step",
         ),
@@ -260,7 +260,7 @@ def _wrong_input_rows(engine_name: str) -> list[Row]:
 def _explicit_solver_row(engine_name: str) -> Row:
     """Row: error of the enforced moment by an explicit solver in the hand-written reference and in MuJoCo, where the
     pitch is an input and no constraint."""
-    error = prescribed_pitch.explicit_error(engine_name, Path())
+    error = prescribed_pitch.explicit_solver_error(engine_name, Path())
     return Observed(
         f"guards.constraint.{engine_name}",
         SYSTEM,

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table, behaviour_row
 from validation.hard_cases import cases_by_family
-from validation.hard_cases.case import IMPLEMENTATIONS, WORDS, Case, CaseOutcome, judge
+from validation.hard_cases.case import IMPLEMENTATIONS, WORDS, CaseOutcome, HardCase, judge
 from validation.hard_cases.catalogue import COVERED_CLASSES, cases_beyond_catalogue
 
 TITLE = "Hard cases"
@@ -30,8 +30,8 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     known, rows, data = cases_by_family(), list[Row](), list[Saved]()
     for family, case in cases_of_quick_run(known) if quick else known:
         with TemporaryDirectory() as files_folder:
-            outcomes = {name: judge(case, name, Path(files_folder)) for name in case.judged()}
-            naive = case.naive(Path(files_folder)) if case.naive else ""
+            outcomes = {name: judge(case, name, Path(files_folder)) for name in case.judged_engines()}
+            naive = case.naive_result(Path(files_folder)) if case.naive_result else ""
         rows += [_outcome_row(case, name, outcome) for name, outcome in outcomes.items()]
         case_texts: Saved = {"name": case.name, "hard": case.difficulty, "check": case.exact_answer}
         case_texts |= {"unit": case.unit, "tolerance": case.tolerance}
@@ -66,7 +66,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
     return rows, {"cases": data, "known": [(family, case.name) for family, case in known]}
 
 
-def cases_of_quick_run(cases_with_family: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
+def cases_of_quick_run(cases_with_family: Sequence[tuple[str, HardCase]]) -> list[tuple[str, HardCase]]:
     """Cases of a quick run: the last case of each family, and every QUICK_CASE_SPACING-th before it."""
     families = dict.fromkeys(family for family, _ in cases_with_family)
     return [
@@ -76,20 +76,20 @@ def cases_of_quick_run(cases_with_family: Sequence[tuple[str, Case]]) -> list[tu
     ]
 
 
-def _outcome_row(hard_case: Case, implementation_name: str, case_outcome: CaseOutcome) -> Row:
+def _outcome_row(hard_case: HardCase, implementation_name: str, case_outcome: CaseOutcome) -> Row:
     """Row of a hard case: its error if a result is expected and given, else its outcome."""
     name = hard_case.name.replace(",", "").replace(" ", "-")
     id = f"hard.{name}.{'any' if hard_case.without_engine else implementation_name}"
     quantity = (
         f"{hard_case.name}{'' if hard_case.without_engine else f', {implementation_name}'}: {hard_case.exact_answer}"
     )
-    if hard_case.wanted(implementation_name) == "right" and case_outcome.error is not None:
+    if hard_case.wanted_outcome(implementation_name) == "right" and case_outcome.error is not None:
         error, judged = case_outcome.error, hard_case.independence(implementation_name)
         return Observed(id, SYSTEM, quantity, error, hard_case.unit).at_most(
             hard_case.tolerance, hard_case.tolerance_reason, judged
         )
     return behaviour_row(
-        id, SYSTEM, quantity, case_outcome.word, hard_case.wanted(implementation_name), hard_case.difficulty
+        id, SYSTEM, quantity, case_outcome.word, hard_case.wanted_outcome(implementation_name), hard_case.difficulty
     )
 
 

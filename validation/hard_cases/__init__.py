@@ -9,14 +9,14 @@ or **SILENT**: a finite wrong answer without a word, which is never accepted.
 from importlib import import_module
 from pkgutil import iter_modules
 
-from validation.hard_cases.case import Case
+from validation.hard_cases.case import HardCase
 
-OTHERS = ("case", "catalogue", "setups")
-FAMILIES = tuple(module.name for module in iter_modules(__path__) if module.name not in OTHERS)
+SHARED_MODULES = ("case", "catalogue", "setups")
+CASE_FAMILIES = tuple(module.name for module in iter_modules(__path__) if module.name not in SHARED_MODULES)
 
 
-def cases_by_family() -> tuple[tuple[str, Case], ...]:
+def cases_by_family() -> tuple[tuple[str, HardCase], ...]:
     """All hard cases as pairs (family, case), in the order of the report's table."""
     return tuple(
-        (family, case) for family in FAMILIES for case in import_module(f"validation.hard_cases.{family}").CASES
+        (family, case) for family in CASE_FAMILIES for case in import_module(f"validation.hard_cases.{family}").CASES
     )

@@ -19,14 +19,14 @@ from models.tyre.tyre_table import stacked_tables
 from validation.braking import braked_trucks as trucks
 from validation.braking import braked_wheels as wheels
 from validation.braking.braked_wheels import DRY, piecewise_linear_friction
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
+from validation.hard_cases.case import IMPLEMENTATIONS, HardCase, OutcomeWord
 
 
-def refusal_case(run: Callable[[], Any]) -> wheels.Error:
-    """Case: ``run`` must raise a refusal. Error: infinite if it returns."""
+def refusal_case(run_case: Callable[[], Any]) -> wheels.Error:
+    """Case: ``run_case`` must raise a refusal. Error: infinite if it returns."""
 
-    def error(implementation: str, folder: Path) -> float:
-        run()
+    def error(engine_name: str, work_folder: Path) -> float:
+        run_case()
         return np.inf
 
     return error
@@ -40,19 +40,28 @@ def inconsistent_brake() -> None:
         raise InputError("", "release", 0.7, str(error)) from None
 
 
-def constant_slip_case(name: str, difficulty: str, error: wheels.Error, tolerance: float = 1e-6) -> Case:
+def constant_slip_case(
+    case_name: str, difficulty: str, error_function: wheels.Error, tolerance: float = 1e-6
+) -> HardCase:
     """Hard case of a wheel at constant slip, judged by the stopping distance m v^2 / (2 F)."""
-    return Case(name, difficulty, "m v^2 / (2 F)", "", tolerance, "the step in which it stops", error)
+    return HardCase(case_name, difficulty, "m v^2 / (2 F)", "", tolerance, "the step in which it stops", error_function)
 
 
-def failure_case(name: str, difficulty: str, error: wheels.Error) -> Case:
+def failure_case(case_name: str, difficulty: str, error_function: wheels.Error) -> HardCase:
     """Hard case in which every implementation must raise an error during the run."""
-    return Case(
-        name, difficulty, "fails, and says when", "", 0.0, "exact", error, dict.fromkeys(IMPLEMENTATIONS, "raised")
+    return HardCase(
+        case_name,
+        difficulty,
+        "fails, and says when",
+        "",
+        0.0,
+        "exact",
+        error_function,
+        dict.fromkeys(IMPLEMENTATIONS, "raised"),
     )
 
 
-LINE = piecewise_linear_friction((0.0, 0.0), (1.0, 0.9))
+LINEAR_FRICTION = piecewise_linear_friction((0.0, 0.0), (1.0, 0.9))
 REFUSED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 CASES = (
     constant_slip_case(
@@ -67,14 +76,14 @@ CASES = (
         wheels.constant_slip_case(DRY, 0.004, 2e-2),
     ),
     constant_slip_case(
-        "table of a single cell", "slip 0 and 1 are its only nodes", wheels.constant_slip_case(LINE, 0.5)
+        "table of a single cell", "slip 0 and 1 are its only nodes", wheels.constant_slip_case(LINEAR_FRICTION, 0.5)
     ),
     constant_slip_case(
         "slip that settles on a node",
         "the slope of friction jumps there",
         wheels.constant_slip_case(piecewise_linear_friction((0.0, 0.0), (0.05, 0.5), (0.2, 0.8), (1.0, 0.6)), 0.05),
     ),
-    Case(
+    HardCase(
         "from rolling, 20 ms",
         "the wheel slows down within two steps",
         "the exact way",
@@ -83,7 +92,7 @@ CASES = (
         "asked for",
         wheels.rolling_start_case(DRY, 0.05, 2e-2),
     ),
-    Case(
+    HardCase(
         "torque just above the peak",
         "falls off along falling friction, slowly at first",
         "the exact way",
@@ -92,7 +101,7 @@ CASES = (
         "asked for",
         wheels.locking_torque_error,
     ),
-    Case(
+    HardCase(
         "torque exactly at the peak",
         "no slip beyond it is stable",
         "between the ways of peak and sliding",
@@ -101,7 +110,7 @@ CASES = (
         "the step in which it stops",
         wheels.peak_torque_error,
     ),
-    Case(
+    HardCase(
         "locked from the start",
         "the rate of slip is 0 / 0 at the end",
         "v^2 / (2 mu g)",
@@ -110,7 +119,7 @@ CASES = (
         "asked for",
         wheels.locked_wheel_error,
     ),
-    Case(
+    HardCase(
         "friction changes under a locked wheel",
         "within a step",
         "its closed form",
@@ -119,7 +128,7 @@ CASES = (
         "the step of the change takes its share of the way",
         wheels.changing_friction_error,
     ),
-    Case(
+    HardCase(
         "friction from 1e-6 to 1.5, locked",
         "bounded by next to nothing",
         "mu g t",
@@ -128,7 +137,7 @@ CASES = (
         "rounding of the speed",
         wheels.friction_range_error,
     ),
-    Case(
+    HardCase(
         "standstill under brakes",
         "friction would push it back",
         "does not move",
@@ -137,8 +146,10 @@ CASES = (
         "exact",
         wheels.standing_vehicle_error,
     ),
-    Case("wheel thrown backwards", "slip above 1", "rolls", "", 1e-6, "25 time constants", wheels.backwards_spin_error),
-    Case(
+    HardCase(
+        "wheel thrown backwards", "slip above 1", "rolls", "", 1e-6, "25 time constants", wheels.backwards_spin_error
+    ),
+    HardCase(
         "brake lets go on a step's end",
         "locked until then, by an explicit state",
         "rolls",
@@ -147,7 +158,7 @@ CASES = (
         "60 time constants once it grips",
         wheels.released_brake_error,
     ),
-    Case(
+    HardCase(
         "truck sliding sideways, locked",
         "slip angles of 58 degrees",
         "gains no energy",
@@ -156,7 +167,7 @@ CASES = (
         "rounding",
         trucks.energy_gain_case((5.0, 8.0, 0.0), 2e4),
     ),
-    Case(
+    HardCase(
         "truck spinning on ice",
         "wheels go forwards and backwards",
         "gains no energy",
@@ -165,7 +176,7 @@ CASES = (
         "rounding",
         trucks.energy_gain_case((8.0, 0.0, 3.0), 2e4),
     ),
-    Case(
+    HardCase(
         "truck on even friction",
         "rounding left and right",
         "does not yaw",
@@ -174,7 +185,7 @@ CASES = (
         "exact",
         trucks.asymmetry_on_even_friction,
     ),
-    Case(
+    HardCase(
         "truck on split friction in a mirror",
         "sides exchanged",
         "mirror image",
@@ -183,7 +194,7 @@ CASES = (
         "rounding",
         trucks.mirrored_truck_error,
     ),
-    Case(
+    HardCase(
         "train that jackknifes, locked",
         "the drawbar folded under it",
         "gains no energy",
@@ -192,7 +203,7 @@ CASES = (
         "rounding",
         trucks.jackknifed_train_error,
     ),
-    Case(
+    HardCase(
         "tyres that lag, at standstill",
         "the tyre is a spring there",
         "stays at rest",
@@ -201,7 +212,7 @@ CASES = (
         "exact",
         trucks.motion_after_rest_on_lagging_tyres,
     ),
-    Case(
+    HardCase(
         "wheel exactly on the line",
         "of split friction",
         "as on the left surface",
@@ -210,7 +221,7 @@ CASES = (
         "exact",
         wheels.surface_line_error,
     ),
-    Case(
+    HardCase(
         "no friction on one side",
         "wheels without any force",
         "mu g t / 2",
@@ -219,7 +230,7 @@ CASES = (
         "it has begun to yaw",
         trucks.split_friction_error,
     ),
-    Case(
+    HardCase(
         "slope of friction changes within a step",
         "from dry on to wet, 20 ms",
         "m v^2 / (2 F)",
@@ -228,7 +239,7 @@ CASES = (
         "the wheel takes up another slip",
         wheels.surface_change_error,
     ),
-    Case(
+    HardCase(
         "valves open for ever",
         "all wheels lock",
         "comes to rest",
@@ -237,7 +248,7 @@ CASES = (
         "exact",
         trucks.rest_error_of_scene(run={"duration": 10.0}),
     ),
-    Case(
+    HardCase(
         "pressure below push-out",
         "hysteresis would pull it below 0",
         "no torque",
@@ -246,7 +257,7 @@ CASES = (
         "exact",
         trucks.torque_below_push_out,
     ),
-    Case(
+    HardCase(
         "slow wheel at the edge of locking",
         "a little less load, and it stands within the step",
         "comes to rest",
@@ -255,7 +266,7 @@ CASES = (
         "exact",
         trucks.rest_error_of_scene(**trucks.J_TURN_AT_LOCKING_LIMIT),
     ),
-    Case(
+    HardCase(
         "one wheel of four lifted",
         "the plane's loads follow its accelerations",
         "statics of three wheels",
@@ -263,7 +274,7 @@ CASES = (
         1e-9,
         "rounding",
         trucks.load_sharing_error,
-        without_engine=True,
+        is_without_engine=True,
     ),
     failure_case("truck that rolls over", "both wheels of a side bear nothing", trucks.overturning_truck_error),
     failure_case(
@@ -284,7 +295,7 @@ CASES = (
     ),
     failure_case("controller answers nothing", "neither valves nor pressures", trucks.impossible_command_case()),
     *(
-        Case(name, "a number from senseless input", "refused", "", 0.0, "exact", refusal_case(run), REFUSED)
+        HardCase(name, "a number from senseless input", "refused", "", 0.0, "exact", refusal_case(run), REFUSED)
         for name, run in (
             (
                 "torque that drives the wheel",

@@ -14,18 +14,18 @@ IMPLEMENTATIONS = ("reference", "exudyn", "mujoco")
 
 
 @dataclass(frozen=True)
-class Case:
+class HardCase:
     """A hard case, judged in each implementation.
 
     Attributes
     ----------
     difficulty, exact_answer : why the case is hard, and the invariant or exact answer, as phrases
     unit, tolerance, tolerance_reason : unit and tolerance of the error, and the reason for the tolerance
-    error : function of the implementation and a folder for input files that returns the error
-    expected : outcomes other than "right", by implementation
-    naive : function that returns, as a phrase, what code without the guard or rule does; None if there is no such test
+    error_function : function of the implementation and a folder for input files that returns the error
+    expected_outcomes : outcomes other than "right", by implementation
+    naive_result : function that returns, as a phrase, what code without the guard or rule does; None if there is none
     answer_independence : how independent the exact answer is of the implementations
-    without_engine : whether no implementation takes part, so that the case is judged only once
+    is_without_engine : whether no implementation takes part, so that the case is judged only once
     """
 
     name: str
@@ -34,26 +34,26 @@ class Case:
     unit: str
     tolerance: float
     tolerance_reason: str
-    error: Callable[[str, Path], float]
-    expected: Mapping[str, OutcomeWord] = field(default_factory=dict)
-    naive: Callable[[Path], str] | None = None
+    error_function: Callable[[str, Path], float]
+    expected_outcomes: Mapping[str, OutcomeWord] = field(default_factory=dict)
+    naive_result: Callable[[Path], str] | None = None
     answer_independence: Independence = "closed form"
-    without_engine: bool = False
+    is_without_engine: bool = False
 
-    def wanted(self, implementation: str) -> OutcomeWord:
+    def wanted_outcome(self, engine_name: str) -> OutcomeWord:
         """The outcome that an implementation must have in this case."""
-        return self.expected.get(implementation, "right")
+        return self.expected_outcomes.get(engine_name, "right")
 
-    def judged(self) -> tuple[str, ...]:
+    def judged_engines(self) -> tuple[str, ...]:
         """Names of the implementations in which this case is judged."""
-        return IMPLEMENTATIONS[:1] if self.without_engine else IMPLEMENTATIONS
+        return IMPLEMENTATIONS[:1] if self.is_without_engine else IMPLEMENTATIONS
 
-    def independence(self, implementation: str) -> Independence:
+    def independence(self, engine_name: str) -> Independence:
         """How independent the exact answer is of an implementation. The tight-tolerance solution uses the reference's
         equations, so that for the reference it is a shared kernel."""
         return (
             "shared kernel"
-            if self.answer_independence == "native" and implementation == "reference"
+            if self.answer_independence == "native" and engine_name == "reference"
             else self.answer_independence
         )
 
@@ -68,11 +68,11 @@ class CaseOutcome:
     message: str = ""
 
 
-def judge(case: Case, implementation: str, folder: Path) -> CaseOutcome:
+def judge(case: HardCase, engine_name: str, work_folder: Path) -> CaseOutcome:
     """Outcome of a case in an implementation. Only InputError and RunFailed count as outcomes; other exceptions pass
     through."""
     try:
-        error = float(case.error(implementation, folder))
+        error = float(case.error_function(engine_name, work_folder))
     except InputError as refusal:
         return CaseOutcome("refused", message=str(refusal))
     except RunFailed as failure:

@@ -13,14 +13,17 @@ COVERED_CLASSES = {
 """Number in the catalogue -> description of the class of failures, and names of the hard cases that cover it."""
 
 
-def missing_cases(names: set[str]) -> list[str]:
+def missing_cases(case_names: set[str]) -> list[str]:
     """Cases that the catalogue names but that do not exist, each with its catalogue number."""
     return [
-        f"{number}: {name}" for number, (_, cases) in COVERED_CLASSES.items() for name in cases if name not in names
+        f"{number}: {name}"
+        for number, (_, cases) in COVERED_CLASSES.items()
+        for name in cases
+        if name not in case_names
     ]
 
 
-def cases_beyond_catalogue(names: list[str]) -> list[str]:
+def cases_beyond_catalogue(case_names: list[str]) -> list[str]:
     """Names of the cases that the catalogue does not contain."""
     named = {name for _, cases in COVERED_CLASSES.values() for name in cases}
-    return [name for name in names if name not in named]
+    return [name for name in case_names if name not in named]

@@ -11,49 +11,52 @@ from models.engines.assembly import Assembly
 from models.systems.pitch_plane.tangent import TangentPath as ErrorPath
 from models.systems.pitch_plane.tangent import noise_covariances
 from validation.hard_cases import setups
-from validation.hard_cases.case import Case
+from validation.hard_cases.case import HardCase
 
 SAMPLE_PERIOD, SAMPLES, STEP = 0.05, 10, 1e-3
 """Period (s) of the held force samples, 35 times the decay time of the fastest pole; number of samples; step (s)."""
 
 
-def _base_assembly(values: np.ndarray) -> Assembly:
-    """The linearised vehicle under its weight, with ``values`` (n, 2) in N added to its wheel force samples."""
+def vehicle_with_added_forces(added_forces: np.ndarray) -> Assembly:
+    """The linearised vehicle under its weight, with ``added_forces`` (n, 2) in N added to its wheel force samples."""
     base = setups.vehicle(geometry="linear")
     forces = setups.static_forces(base, SAMPLES, SAMPLE_PERIOD)
-    return setups.driven_by_forces(base, replace(forces, values=forces.values + values))
+    return setups.driven_by_forces(base, replace(forces, values=forces.values + added_forces))
 
 
-def covariance_error(engine: str, folder: Path) -> float:
+def covariance_error(engine_name: str, work_folder: Path) -> float:
     """Case: a force error of 1 N in each single sample is simulated. Error: relative difference between the sum of
     squared responses and the covariance recursion."""
-    quiet = setups.run(engine, _base_assembly(np.zeros((SAMPLES, 2))), STEP, SAMPLE_PERIOD * SAMPLES).states[-1]
+    quiet = setups.run(
+        engine_name, vehicle_with_added_forces(np.zeros((SAMPLES, 2))), STEP, SAMPLE_PERIOD * SAMPLES
+    ).states[-1]
     responses = []
     for sample in range(SAMPLES):
         for wheel in range(2):
             values = np.zeros((SAMPLES, 2))
             values[sample, wheel] = 1.0
             responses.append(
-                setups.run(engine, _base_assembly(values), STEP, SAMPLE_PERIOD * SAMPLES).states[-1] - quiet
+                setups.run(engine_name, vehicle_with_added_forces(values), STEP, SAMPLE_PERIOD * SAMPLES).states[-1]
+                - quiet
             )
     covariance, expected = np.array(responses).T @ np.array(responses), _covariance_recursion()
     return setups.largest_magnitude(covariance - expected) / setups.largest_magnitude(expected)
 
 
 def _covariance_recursion() -> np.ndarray:
-    assembly = _base_assembly(np.zeros((SAMPLES, 2)))
+    assembly = vehicle_with_added_forces(np.zeros((SAMPLES, 2)))
     assert isinstance(assembly.input, Sampled)
     return noise_covariances(ErrorPath(assembly, assembly.input, round(SAMPLE_PERIOD / STEP), SAMPLES), 1.0)[-1]
 
 
-def van_loan_naive(folder: Path) -> str:
+def van_loan_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: process noise over one and over twenty periods by filterpy's van Loan
     discretisation."""
     from filterpy.common import van_loan_discretization
 
     from models.engines.stability import first_order, linearised
 
-    base = _base_assembly(np.zeros((SAMPLES, 2)))
+    base = vehicle_with_added_forces(np.zeros((SAMPLES, 2)))
     p, linear = base.parameters, linearised(base.vehicle)
     pushes = np.zeros((8, 2))
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
@@ -69,7 +72,7 @@ def van_loan_naive(folder: Path) -> str:
 
 
 CASES = (
-    Case(
+    HardCase(
         "covariance beside a stiff pole",
         "noise held over 50 ms, 35 times the decay time of a pole at -697 1/s: a block exponential overflows",
         "each sample alone, squared and summed",
@@ -77,7 +80,7 @@ CASES = (
         1e-9,
         "the same sum in another order, rounding aside",
         covariance_error,
-        naive=van_loan_naive,
+        naive_result=van_loan_naive_result,
         answer_independence="native",
     ),
 )

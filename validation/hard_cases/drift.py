@@ -23,7 +23,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.scenes import STUDY_ROAD, force_scene, road_scene
-from validation.hard_cases.case import Case
+from validation.hard_cases.case import HardCase
 from validation.hard_cases.setups import REFUSED, largest_magnitude
 
 DURATION = 8.0
@@ -33,47 +33,49 @@ SOFT_STIFFNESS = 50.0
 """Stiffness (N m/rad) of a pitch spring that is too soft; 82 are needed on this road."""
 DRIFTED_PITCH = 0.05
 """Pitch error (rad) beyond which runs are not compared."""
-HEAVY_NOISE = 300.0
+HEAVY_FORCE_NOISE = 300.0
 """Standard deviation (N) of force noise with which a run drifts off after some seconds."""
 
 
 @cache
-def true_run(grade: float = 0.0) -> Result:
+def true_run(road_grade: float = 0.0) -> Result:
     """Virtual measurement on the study road with a grade (rad): the true run."""
-    road = STUDY_ROAD | ({"grade": grade} if grade else {})
+    road = STUDY_ROAD | ({"grade": road_grade} if road_grade else {})
     return simulate(road_scene(duration=DURATION, road=road), "reference")
 
 
 def scene_on_true_forces(
-    folder: Path, truth: Result, effects: dict[str, Any] | None = None, tilt: float = 0.0
+    work_folder: Path, true_result: Result, effects: dict[str, Any] | None = None, start_pitch_rate: float = 0.0
 ) -> Scene:
-    """Scene under the wheel forces of the true run, with a wrong initial pitch rate ``tilt`` (rad/s)."""
-    write_measurement(truth, folder, 1e-3)
-    scene = force_scene(folder, duration=DURATION, effects=effects)
-    return scene.model_copy(update={"start": {"pitch_rate": tilt}} if tilt else {})
+    """Scene under the wheel forces of the true run, with a wrong initial pitch rate ``start_pitch_rate`` (rad/s)."""
+    write_measurement(true_result, work_folder, 1e-3)
+    scene = force_scene(work_folder, duration=DURATION, effects=effects)
+    return scene.model_copy(update={"start": {"pitch_rate": start_pitch_rate}} if start_pitch_rate else {})
 
 
-def figures_and_errors(run: Result, truth: Result, scene: Scene) -> tuple[RunFigures, RunErrors]:
+def figures_and_errors(disturbed_run: Result, true_result: Result, scene: Scene) -> tuple[RunFigures, RunErrors]:
     """Figures of a run that can be computed without the true run, and errors of the run against the true run."""
-    return figures_of_run(run, scene.vehicle_parameters()), errors_of_run(run, truth)
+    return figures_of_run(disturbed_run, scene.vehicle_parameters()), errors_of_run(disturbed_run, true_result)
 
 
-def verdict_words(engine: str, scene: Scene, truth: Result) -> tuple[str, str]:
+def verdict_words(engine_name: str, scene: Scene, true_result: Result) -> tuple[str, str]:
     """Words of the verdicts on a run in an engine, with and without knowledge of the true run."""
-    scores, wrong = figures_and_errors(simulate(scene, engine), truth, scene)
+    scores, wrong = figures_and_errors(simulate(scene, engine_name), true_result, scene)
     known = verdict_without_true_run(scores, scene.effects, DURATION, AcceptanceLimits())
     return verdict_on_run(scores, wrong, scene.effects, AcceptanceLimits()).word, known.word
 
 
-def tumbled_verdict_error(engine: str, folder: Path) -> float:
+def tumbled_verdict_error(engine_name: str, work_folder: Path) -> float:
     """Case: a free run that has turned over must be rejected, with and without the true run. Error: 1 if it is not."""
-    judged = verdict_words(engine, scene_on_true_forces(folder, true_run(), tilt=WRONG_PITCH_RATE), true_run())
+    judged = verdict_words(
+        engine_name, scene_on_true_forces(work_folder, true_run(), start_pitch_rate=WRONG_PITCH_RATE), true_run()
+    )
     return float(judged != ("rejected", "rejected"))
 
 
-def tumbled_naive(folder: Path) -> str:
+def tumbled_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: damage of a tumbled run from its vertical forces alone."""
-    scene = scene_on_true_forces(folder, true_run(), tilt=WRONG_PITCH_RATE)
+    scene = scene_on_true_forces(work_folder, true_run(), start_pitch_rate=WRONG_PITCH_RATE)
     scores, wrong = figures_and_errors(simulate(scene, "reference"), true_run(), scene)
     return (
         f"at a pitch of {scores.pitch_max:.1f} rad its vertical f3 does {wrong.vertical_damage['f3']:.3f} times the "
@@ -85,17 +87,19 @@ SOFT_SPRING = {"pitch_spring": {"stiffness": SOFT_STIFFNESS, "damping": 250.0}}
 FIRM_SPRING = {"pitch_spring": {"stiffness": 300.0, "damping": 600.0}}
 
 
-def soft_spring_verdict_error(engine: str, folder: Path) -> float:
+def soft_spring_verdict_error(engine_name: str, work_folder: Path) -> float:
     """Case: a run with a stabilising spring that is too soft must be rejected. Error: 1 if it is not."""
     return float(
-        verdict_words(engine, scene_on_true_forces(folder, true_run(), SOFT_SPRING, WRONG_PITCH_RATE), true_run())[0]
+        verdict_words(
+            engine_name, scene_on_true_forces(work_folder, true_run(), SOFT_SPRING, WRONG_PITCH_RATE), true_run()
+        )[0]
         != "rejected"
     )
 
 
-def soft_spring_naive(folder: Path) -> str:
+def soft_spring_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: figures of the run itself, which do not show that the spring is too soft."""
-    scene = scene_on_true_forces(folder, true_run(), SOFT_SPRING, WRONG_PITCH_RATE)
+    scene = scene_on_true_forces(work_folder, true_run(), SOFT_SPRING, WRONG_PITCH_RATE)
     scores, wrong = figures_and_errors(simulate(scene, "reference"), true_run(), scene)
     return (
         f"its artificial moment is {scores.moment_share_band:.1%} of I pitch'' and its vertical f3 does "
@@ -103,16 +107,16 @@ def soft_spring_naive(folder: Path) -> str:
     )
 
 
-def graded_verdict_error(engine: str, folder: Path) -> float:
+def graded_verdict_error(engine_name: str, work_folder: Path) -> float:
     """Case: a stabilising spring on a grade, which gives wrong results. Error: 0 if the run is rejected with the true
     run and not accepted without it, else 1."""
-    judged = verdict_words(engine, scene_on_true_forces(folder, true_run(0.1), FIRM_SPRING), true_run(0.1))
+    judged = verdict_words(engine_name, scene_on_true_forces(work_folder, true_run(0.1), FIRM_SPRING), true_run(0.1))
     return float(judged != ("rejected", "stabilise"))
 
 
-def graded_naive(folder: Path) -> str:
+def graded_naive_result(work_folder: Path) -> str:
     """Figures of a run with a stabilising spring on a graded road, as text."""
-    scene = scene_on_true_forces(folder, true_run(0.1), FIRM_SPRING)
+    scene = scene_on_true_forces(work_folder, true_run(0.1), FIRM_SPRING)
     scores, wrong = figures_and_errors(simulate(scene, "reference"), true_run(0.1), scene)
     return (
         f"its artificial moment is {scores.moment_share_band:.1%} of I pitch''; its pitch is {wrong.pitch_max:.2f} "
@@ -121,92 +125,93 @@ def graded_naive(folder: Path) -> str:
 
 
 @cache
-def _random_walk() -> np.ndarray:
+def random_walk_load() -> np.ndarray:
+    """Load (500,) that is a random walk with steps of standard deviation 1, with a fixed seed."""
     return np.random.default_rng(2).standard_normal(500).cumsum()
 
 
-def damage_with_nan(engine: str, folder: Path) -> float:
+def damage_with_nan(engine_name: str, work_folder: Path) -> float:
     """Case: a load with one sample that is NaN must be refused. Error: the damage that is returned."""
-    load = _random_walk().copy()
+    load = random_walk_load().copy()
     load[250] = np.nan
     return pseudo_damage(load)
 
 
-def damage_with_nan_naive(folder: Path) -> str:
+def damage_with_nan_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: damage of a load with a NaN by the rainflow library."""
     from rainflow import extract_cycles
 
-    load = _random_walk().copy()
+    load = random_walk_load().copy()
     load[250] = np.nan
     damage = sum(count * span**5 for span, _, count, _, _ in extract_cycles(load.tolist()))
-    return f"rainflow alone finds {damage / pseudo_damage(_random_walk()):.2g} times the damage of the whole load"
+    return f"rainflow alone finds {damage / pseudo_damage(random_walk_load()):.2g} times the damage of the whole load"
 
 
-def damage_without_samples(engine: str, folder: Path) -> float:
+def damage_without_samples(engine_name: str, work_folder: Path) -> float:
     """Case: a load without samples must be refused. Error: the damage that is returned."""
     return pseudo_damage(np.empty(0))
 
 
-def ratio_to_constant_load(engine: str, folder: Path) -> float:
+def ratio_to_constant_load(engine_name: str, work_folder: Path) -> float:
     """Case: a damage ratio to a constant true load, which has no damage, must be refused. Error: the ratio that is
     returned."""
-    return damage_ratio(_random_walk(), np.full(500, 3.0))
+    return damage_ratio(random_walk_load(), np.full(500, 3.0))
 
 
-def ratio_of_huge_loads(engine: str, folder: Path) -> float:
+def ratio_of_huge_loads(engine_name: str, work_folder: Path) -> float:
     """Case: a ratio of two damages beyond the range of floating-point numbers must be refused. Error: the ratio that is
     returned."""
     load = np.array([0.0, 1e200, 0.0])
     return damage_ratio(load, load)
 
 
-def damage_with_nan_slope(engine: str, folder: Path) -> float:
+def damage_with_nan_slope(engine_name: str, work_folder: Path) -> float:
     """Case: a Wöhler slope that is NaN, which a range of 1 would hide, must be refused. Error: the damage that is
     returned."""
     return pseudo_damage(np.array([0.0, 1.0, 0.0]), np.nan)
 
 
-def negative_intensity_drift_off(engine: str, folder: Path) -> float:
+def negative_intensity_drift_off(engine_name: str, work_folder: Path) -> float:
     """Case: drift-off time under noise of negative intensity must be refused. Error: the time that is returned."""
     return drift_off_time(1.0, -1.0, 0.05)
 
 
-def two_point_damage_error(engine: str, folder: Path) -> float:
+def two_point_damage_error(engine_name: str, work_folder: Path) -> float:
     """Case: a load with two samples, which is half a cycle. Error: difference of its damage from 0.5 range^5."""
     return abs(pseudo_damage(np.array([0.0, 2.0]), 5.0) - 0.5 * 2.0**5)
 
 
-def two_points_naive(folder: Path) -> str:
+def two_points_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: damage of a load with two samples by the rainflow library."""
     from rainflow import extract_cycles
 
     return f"rainflow alone finds {len(list(extract_cycles([0.0, 2.0])))} cycles in it"
 
 
-def difference_before_drift(engine: str, folder: Path) -> float:
+def difference_before_drift(engine_name: str, work_folder: Path) -> float:
     """Case: a noisy run compared with another implementation until drift-off. Error: largest difference of the states
     divided by the largest state."""
-    scene = scene_on_true_forces(folder, true_run(), {"force_noise": {"deviation": HEAVY_NOISE}})
-    other_engine = "mujoco" if engine == "reference" else "reference"
-    first, second_run = (simulate(scene, name) for name in (engine, other_engine))
+    scene = scene_on_true_forces(work_folder, true_run(), {"force_noise": {"deviation": HEAVY_FORCE_NOISE}})
+    other_engine = "mujoco" if engine_name == "reference" else "reference"
+    first, second_run = (simulate(scene, name) for name in (engine_name, other_engine))
     rows_before = slice(None, _first_row_off(first, true_run()))
     return largest_magnitude(first.states[rows_before] - second_run.states[rows_before]) / largest_magnitude(
         second_run.states[rows_before]
     )
 
 
-def _first_row_off(run: Result, truth: Result) -> int | None:
+def _first_row_off(disturbed_run: Result, true_result: Result) -> int | None:
     """First row at which the pitch of a run differs from the true pitch by more than DRIFTED_PITCH; None if it never
     does."""
-    far = np.flatnonzero(np.abs(run["pitch"] - truth["pitch"]) > DRIFTED_PITCH)
+    far = np.flatnonzero(np.abs(disturbed_run["pitch"] - true_result["pitch"]) > DRIFTED_PITCH)
     return int(far[0]) if len(far) else None
 
 
-def before_drift_naive(folder: Path) -> str:
+def before_drift_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: two step sizes of the reference compared over 30 s, beyond drift-off."""
     truth = simulate(road_scene(duration=30.0), "reference")
-    write_measurement(truth, folder, 1e-3)
-    scene = force_scene(folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY_NOISE}})
+    write_measurement(truth, work_folder, 1e-3)
+    scene = force_scene(work_folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY_FORCE_NOISE}})
     coarse, fine = (simulate(scene, "reference", Settings("RK4", step, 30.0)) for step in (1e-3, 5e-4))
     gap = np.abs(coarse["pitch"] - fine["pitch"][::2])
     gap_before = gap[: _first_row_off(coarse, truth)].max()
@@ -214,7 +219,7 @@ def before_drift_naive(folder: Path) -> str:
 
 
 CASES = (
-    Case(
+    HardCase(
         "drifted run scored by its vertical forces",
         "the vertical force is the same at every pitch",
         "rejected with the truth and without it",
@@ -222,9 +227,9 @@ CASES = (
         0.0,
         "a word is right or wrong",
         tumbled_verdict_error,
-        naive=tumbled_naive,
+        naive_result=tumbled_naive_result,
     ),
-    Case(
+    HardCase(
         "spring below the smallest that holds",
         "it is a stabiliser, and the vehicle drifts all the same",
         "rejected",
@@ -232,9 +237,9 @@ CASES = (
         0.0,
         "a word is right or wrong",
         soft_spring_verdict_error,
-        naive=soft_spring_naive,
+        naive_result=soft_spring_naive_result,
     ),
-    Case(
+    HardCase(
         "spring on a grade",
         "keeping the pitch near zero is wrong there, and no figure of the run shows it",
         "rejected with the truth; without it never accepted",
@@ -242,9 +247,9 @@ CASES = (
         0.0,
         "a word is right or wrong",
         graded_verdict_error,
-        naive=graded_naive,
+        naive_result=graded_naive_result,
     ),
-    Case(
+    HardCase(
         "load with a value that is not a number",
         "rainflow compares, and every comparison with it is false",
         "refused",
@@ -253,9 +258,9 @@ CASES = (
         "no damage is right",
         damage_with_nan,
         REFUSED,
-        damage_with_nan_naive,
+        damage_with_nan_naive_result,
     ),
-    Case(
+    HardCase(
         "load without a sample",
         "no cycle, but no measurement either",
         "refused",
@@ -265,7 +270,7 @@ CASES = (
         damage_without_samples,
         REFUSED,
     ),
-    Case(
+    HardCase(
         "load beyond all numbers",
         "inf / inf is not a number, and a table shows it as a ratio",
         "refused",
@@ -274,9 +279,9 @@ CASES = (
         "there is no answer",
         ratio_of_huge_loads,
         REFUSED,
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "Woehler exponent that is no number",
         "1 to any power is 1",
         "refused",
@@ -285,9 +290,9 @@ CASES = (
         "there is no answer",
         damage_with_nan_slope,
         REFUSED,
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "drift-off by noise of negative intensity",
         "a root is found where none has a meaning",
         "refused",
@@ -296,9 +301,9 @@ CASES = (
         "there is no answer",
         negative_intensity_drift_off,
         REFUSED,
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "true load that never varies",
         "its damage is 0, by which the ratio would divide",
         "refused",
@@ -308,7 +313,7 @@ CASES = (
         ratio_to_constant_load,
         REFUSED,
     ),
-    Case(
+    HardCase(
         "load of a single rise",
         "two turning points make half a cycle",
         "half of range^5",
@@ -316,9 +321,9 @@ CASES = (
         0.0,
         "exact in doubles",
         two_point_damage_error,
-        naive=two_points_naive,
+        naive_result=two_points_naive_result,
     ),
-    Case(
+    HardCase(
         "engines compared up to the drift-off",
         "errors grow without bound, rounding among them: beyond the drift-off a difference says nothing of an engine",
         "another implementation, same noise file",
@@ -326,7 +331,7 @@ CASES = (
         1e-9,
         "rounding of 1e-15 to 1e-13 that grows by less than 100",
         difference_before_drift,
-        naive=before_drift_naive,
+        naive_result=before_drift_naive_result,
         answer_independence="native",
     ),
 )

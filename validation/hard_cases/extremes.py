@@ -7,7 +7,7 @@ import numpy as np
 
 from models.engines.assembly import Assembly
 from validation.hard_cases import setups
-from validation.hard_cases.case import Case
+from validation.hard_cases.case import HardCase
 from validation.hard_cases.setups import REFUSED, exact_states, largest_magnitude, run, unchecked_run, vehicle
 
 IMPLICIT_INTEGRATORS = {**setups.IMPLICIT_INTEGRATORS, "reference": "LSODA"}
@@ -23,21 +23,21 @@ def _raised_vehicle(base_assembly: Assembly) -> Assembly:
     return replace(base_assembly, initial=base_assembly.initial - np.array([0, 0, 0.01, 0, 0, 0, 0, 0]))
 
 
-def _distance_from_equilibrium(engine: str, base_assembly: Assembly, integrator: str = "") -> float:
+def _distance_from_equilibrium(engine_name: str, base_assembly: Assembly, integrator: str = "") -> float:
     """Distance of the state from the equilibrium after 3 s, divided by the initial displacement."""
-    end = run(engine, _raised_vehicle(base_assembly), 1e-3, 3.0, integrator, tolerance=TOLERANCE).states[-1]
+    end = run(engine_name, _raised_vehicle(base_assembly), 1e-3, 3.0, integrator, tolerance=TOLERANCE).states[-1]
     return largest_magnitude(end - base_assembly.initial) / 0.01
 
 
-def undamped_error(engine: str, folder: Path) -> float:
+def undamped_error(engine_name: str, work_folder: Path) -> float:
     """Case: a vehicle without any dampers for 1 s. Error: difference of the states from the matrix exponential, divided
     by the largest motion."""
-    return _ringing_error(engine)
+    return _ringing_error(engine_name)
 
 
-def _ringing_error(engine: str, integrator: str = "") -> float:
+def _ringing_error(engine_name: str, integrator: str = "") -> float:
     base, truth = _undamped_vehicle()
-    return largest_magnitude(run(engine, base, 1e-3, 1.0, integrator).states - truth) / largest_magnitude(
+    return largest_magnitude(run(engine_name, base, 1e-3, 1.0, integrator).states - truth) / largest_magnitude(
         truth - base.initial
     )
 
@@ -48,7 +48,7 @@ def _undamped_vehicle() -> tuple[Assembly, np.ndarray]:
     return base, exact_states(base, 1e-3, 1000)
 
 
-def undamped_unchecked_euler(folder: Path) -> str:
+def undamped_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: explicit Euler with the check bypassed, by which every mode grows."""
     base, truth = _undamped_vehicle()
     states = unchecked_run("exudyn", base, 1e-3, 1.0, "ExplicitEuler").states
@@ -58,37 +58,37 @@ def undamped_unchecked_euler(folder: Path) -> str:
     )
 
 
-def undamped_euler_error(engine: str, folder: Path) -> float:
+def undamped_euler_error(engine_name: str, work_folder: Path) -> float:
     """Case: undamped oscillation by an explicit first-order method, which makes it grow. Error: difference of the
     states from the matrix exponential, divided by the largest motion."""
-    return _ringing_error(engine, {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine])
+    return _ringing_error(engine_name, {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine_name])
 
 
-def light_wheel_error(engine: str, folder: Path) -> float:
+def light_wheel_error(engine_name: str, work_folder: Path) -> float:
     """Case: wheels of 0.75 g under 750 kg, with poles of -1.4e7 1/s, at the recommended settings. Error: distance from
     equilibrium after 3 s divided by the initial displacement."""
-    return _distance_from_equilibrium(engine, vehicle(m1=7.5e-4, m2=7.5e-4))
+    return _distance_from_equilibrium(engine_name, vehicle(m1=7.5e-4, m2=7.5e-4))
 
 
-def light_wheel_implicit_error(engine: str, folder: Path) -> float:
+def light_wheel_implicit_error(engine_name: str, work_folder: Path) -> float:
     """Case: wheels of 0.75 g under 750 kg by an implicit integrator. Error: distance from equilibrium after 3 s divided
     by the initial displacement."""
-    return _distance_from_equilibrium(engine, vehicle(m1=7.5e-4, m2=7.5e-4), IMPLICIT_INTEGRATORS[engine])
+    return _distance_from_equilibrium(engine_name, vehicle(m1=7.5e-4, m2=7.5e-4), IMPLICIT_INTEGRATORS[engine_name])
 
 
-def stiff_tyre_error(engine: str, folder: Path) -> float:
+def stiff_tyre_error(engine_name: str, work_folder: Path) -> float:
     """Case: tyres of 1e9 N/m, so that the wheels oscillate at 8,200 rad/s, at the recommended settings. Error: distance
     from equilibrium after 3 s divided by the initial displacement."""
-    return _distance_from_equilibrium(engine, vehicle(k1=1e9, k2=1e9))
+    return _distance_from_equilibrium(engine_name, vehicle(k1=1e9, k2=1e9))
 
 
-def stiff_tyre_implicit_error(engine: str, folder: Path) -> float:
+def stiff_tyre_implicit_error(engine_name: str, work_folder: Path) -> float:
     """Case: tyres of 1e9 N/m by an implicit integrator. Error: distance from equilibrium after 3 s divided by the
     initial displacement."""
-    return _distance_from_equilibrium(engine, vehicle(k1=1e9, k2=1e9), IMPLICIT_INTEGRATORS[engine])
+    return _distance_from_equilibrium(engine_name, vehicle(k1=1e9, k2=1e9), IMPLICIT_INTEGRATORS[engine_name])
 
 
-def stiff_tyre_naive(folder: Path) -> str:
+def stiff_tyre_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: two steps with the check bypassed."""
     base = vehicle(k1=1e9, k2=1e9)
     end = unchecked_run("mujoco", _raised_vehicle(base), 1e-3, 2e-3).states[-1]
@@ -99,7 +99,7 @@ AT_REST_REASON = "the vehicle is back in its equilibrium after 3 s"
 DECAYED_REASON = "the slowest mode, -10 1/s, has shrunk to 1e-13; first-order steps damp it a little less"
 
 CASES = (
-    Case(
+    HardCase(
         "no damping",
         "poles on the imaginary axis: nothing forgives a method that adds energy",
         "matrix exponential, 1 s",
@@ -108,9 +108,9 @@ CASES = (
         "RK4 at 1 ms and 121 rad/s: a phase error of 2e-7 per step",
         undamped_error,
         {},
-        undamped_unchecked_euler,
+        undamped_naive_result,
     ),
-    Case(
+    HardCase(
         "no damping, first order",
         "explicit Euler adds energy at every step. The reference runs RK4; MuJoCo's Euler is symplectic here",
         "matrix exponential, or refused",
@@ -120,7 +120,7 @@ CASES = (
         undamped_euler_error,
         {"exudyn": "refused"},
     ),
-    Case(
+    HardCase(
         "mass ratio 1e6",
         "a light wheel on a stiff damper: poles at -1.4e7 1/s",
         AT_REST_REASON,
@@ -130,7 +130,7 @@ CASES = (
         light_wheel_error,
         REFUSED,
     ),
-    Case(
+    HardCase(
         "mass ratio 1e6, implicit",
         "one step spans 14,000 time constants",
         AT_REST_REASON,
@@ -139,7 +139,7 @@ CASES = (
         DECAYED_REASON,
         light_wheel_implicit_error,
     ),
-    Case(
+    HardCase(
         "stiffness 1e9",
         "wheels at 8,200 rad/s",
         AT_REST_REASON,
@@ -148,9 +148,9 @@ CASES = (
         DECAYED_REASON,
         stiff_tyre_error,
         REFUSED,
-        stiff_tyre_naive,
+        stiff_tyre_naive_result,
     ),
-    Case(
+    HardCase(
         "stiffness 1e9, implicit",
         "one step spans 1.3 periods of the wheel",
         AT_REST_REASON,

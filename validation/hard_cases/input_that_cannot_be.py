@@ -17,11 +17,11 @@ from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.parameters.asymmetric_twin import PARAMETERS as TWIN
 from models.vehicles.plausible_plane import plausible_plane
 from validation.common.scenes import road_scene
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
+from validation.hard_cases.case import IMPLEMENTATIONS, HardCase, OutcomeWord
 
 SAMPLE_PERIOD, DURATION = 1e-3, 20.0
-WHEELS = np.array([TWIN.m1, TWIN.m2]) * TWIN.g
-LOADS = TWIN.m3 * TWIN.g * np.array([TWIN.a, TWIN.b]) / (TWIN.a + TWIN.b) + WHEELS
+WHEEL_WEIGHTS = np.array([TWIN.m1, TWIN.m2]) * TWIN.g
+STATIC_WHEEL_LOADS = TWIN.m3 * TWIN.g * np.array([TWIN.a, TWIN.b]) / (TWIN.a + TWIN.b) + WHEEL_WEIGHTS
 ForceChange = Callable[[np.ndarray], np.ndarray]
 REFUSED: dict[str, ForceChange] = {
     "wheel forces with the other sign": lambda f: -f,
@@ -31,9 +31,9 @@ REFUSED: dict[str, ForceChange] = {
     "wheel forces in daN": lambda f: f / 10,
     "rear wheel force in kN": lambda f: f * [1, 1e-3],
     "wheel forces of exchanged axles": lambda f: f[:, ::-1],
-    "wheel forces without the static load": lambda f: f - LOADS,
-    "front wheel force without the static load": lambda f: f - LOADS * [1, 0],
-    "wheel forces measured above the wheels": lambda f: f - WHEELS,
+    "wheel forces without the static load": lambda f: f - STATIC_WHEEL_LOADS,
+    "front wheel force without the static load": lambda f: f - STATIC_WHEEL_LOADS * [1, 0],
+    "wheel forces measured above the wheels": lambda f: f - WHEEL_WEIGHTS,
     "wheel forces of one side": lambda f: f / 2,
     "wheel forces 15 % low": lambda f: f * 0.85,
 }
@@ -42,7 +42,9 @@ DOUBTED: dict[str, ForceChange] = {
     "wheel forces 2 % high": lambda f: f * 1.02,
     "front wheel force 2 % high": lambda f: f * [1.02, 1],
     "offset of the rear wheel force": lambda f: f + np.array([0, 60.0]),
-    "front wheel force that never changes": lambda f: np.column_stack([np.full(len(f), LOADS[0]), f[:, 1]]),
+    "front wheel force that never changes": lambda f: np.column_stack(
+        [np.full(len(f), STATIC_WHEEL_LOADS[0]), f[:, 1]]
+    ),
 }
 QUERIED: dict[str, dict[str, float]] = {
     "chassis in tonnes": {"m3": 1.35},
@@ -62,14 +64,14 @@ def true_forces() -> np.ndarray:
     return np.column_stack([run["f1"], run["f2"]])
 
 
-def error_texts(change: ForceChange) -> list[str]:
+def error_texts(change_forces: ForceChange) -> list[str]:
     """Texts of the doubts that the input check finds in changed wheel forces. Raises InputError if it finds an
     error."""
     front, rear = (
         MeasuredSignal(axle, "forces.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0)
         for axle in ("front", "rear")
     )
-    forces = np.ascontiguousarray(change(true_forces()))
+    forces = np.ascontiguousarray(change_forces(true_forces()))
     findings = check_axle_forces(AxleForces(forces, SAMPLE_PERIOD, TWIN, ((front,), (rear,)), DURATION, FILE_REMEDIES))
     errors = [finding.text for finding in findings if finding.weight == "error"]
     if errors:
@@ -77,38 +79,42 @@ def error_texts(change: ForceChange) -> list[str]:
     return [finding.text for finding in findings if finding.weight == "doubt"]
 
 
-def _missed_doubts(change: ForceChange, doubted: bool, _: str, folder: Path) -> float:
-    return abs(len(error_texts(change)) - doubted)
+def _missed_doubts(change_forces: ForceChange, is_doubted: bool, _: str, work_folder: Path) -> float:
+    return abs(len(error_texts(change_forces)) - is_doubted)
 
 
-def _unqueried_vehicle(change: dict[str, float], _: str, folder: Path) -> float:
-    return float(not plausible_plane(TWIN.model_copy(update=change)))
+def _unqueried_vehicle(parameter_changes: dict[str, float], _: str, work_folder: Path) -> float:
+    return float(not plausible_plane(TWIN.model_copy(update=parameter_changes)))
 
 
-def _case(name: str, error: Callable[[str, Path], float], expected_ending: OutcomeWord, message: str) -> Case:
+def _refusal_case(
+    case_name: str, error_function: Callable[[str, Path], float], expected_ending: OutcomeWord, message: str
+) -> HardCase:
     expected: dict[str, OutcomeWord] = (
         dict.fromkeys(IMPLEMENTATIONS, expected_ending) if expected_ending != "right" else {}
     )
-    return Case(
-        name,
+    return HardCase(
+        case_name,
         "engines run it without a word",
         message,
         "unnamed",
         0.0,
         "it is named or it is not",
-        error,
+        error_function,
         expected,
-        without_engine=True,
+        is_without_engine=True,
     )
 
 
 CASES = (
     *(
-        _case(name, partial(_missed_doubts, change, True), "refused", "refused before the run, with what is wrong")
+        _refusal_case(
+            name, partial(_missed_doubts, change, True), "refused", "refused before the run, with what is wrong"
+        )
         for name, change in REFUSED.items()
     ),
     *(
-        _case(
+        _refusal_case(
             name,
             partial(_missed_doubts, change, True),
             "right",
@@ -116,9 +122,9 @@ CASES = (
         )
         for name, change in DOUBTED.items()
     ),
-    _case("true wheel forces", partial(_missed_doubts, lambda f: f, False), "right", "nothing is said"),
+    _refusal_case("true wheel forces", partial(_missed_doubts, lambda f: f, False), "right", "nothing is said"),
     *(
-        _case(name, partial(_unqueried_vehicle, change), "right", "queried, with the value and what is usual")
+        _refusal_case(name, partial(_unqueried_vehicle, change), "right", "queried, with the value and what is usual")
         for name, change in QUERIED.items()
     ),
 )

@@ -31,29 +31,31 @@ from models.vehicles.kinematics import Kinematics
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.bounces import BouncingVehicle, bounce_energy
 from validation.hard_cases import setups
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
+from validation.hard_cases.case import IMPLEMENTATIONS, HardCase, OutcomeWord
 
-TWIN = "asymmetric_twin"
+ASYMMETRIC_TWIN = "asymmetric_twin"
 STEP, LONGEST_DURATION = 1e-4, 0.6
 """Step (s) of most runs, and their duration (s), which includes several landings of both wheels."""
 FALLING_STATE = np.array([-0.3, -0.2, -0.4, 0.05, 0.0, 0.0, 0.0, 0.0])
 """Initial state with both wheels in the air, the front higher."""
-Error = Callable[[str, Path], float]
+ErrorFunction = Callable[[str, Path], float]
 
 
-def lifting_half_car(start_state: np.ndarray, geometry: str, override: dict[str, float]) -> Assembly:
+def lifting_half_car(start_state: np.ndarray, geometry: str, parameter_changes: dict[str, float]) -> Assembly:
     """The asymmetric half car on tyres that can lift off, above a flat road."""
-    return setups.vehicle(TWIN, geometry, start_state, {"lift_off": {}}, **override)
+    return setups.vehicle(ASYMMETRIC_TWIN, geometry, start_state, {"lift_off": {}}, **parameter_changes)
 
 
-def exact_path_case(step: float = STEP, start_state: np.ndarray = FALLING_STATE, **override: float) -> Error:
+def exact_path_case(
+    time_step: float = STEP, start_state: np.ndarray = FALLING_STATE, **parameter_changes: float
+) -> ErrorFunction:
     """Case: a bouncing vehicle. Error: largest difference of the states (m, rad, m/s, rad/s) from the exact path."""
 
-    def error(engine: str, folder: Path) -> float:
-        assembly = lifting_half_car(start_state, "linear", override)
-        states = setups.run(engine, assembly, step, LONGEST_DURATION).states
-        stride = max(1, round(step / STEP))
-        exact = BouncingVehicle(assembly, STEP if stride > 1 else step).path(
+    def error(engine_name: str, work_folder: Path) -> float:
+        assembly = lifting_half_car(start_state, "linear", parameter_changes)
+        states = setups.run(engine_name, assembly, time_step, LONGEST_DURATION).states
+        stride = max(1, round(time_step / STEP))
+        exact = BouncingVehicle(assembly, STEP if stride > 1 else time_step).path(
             assembly.initial, stride * (len(states) - 1)
         )
         return setups.largest_magnitude(states - exact[::stride])
@@ -61,13 +63,13 @@ def exact_path_case(step: float = STEP, start_state: np.ndarray = FALLING_STATE,
     return error
 
 
-def energy_gain_case(**override: float) -> Error:
+def energy_gain_case(**parameter_changes: float) -> ErrorFunction:
     """Case: a vehicle that falls and bounces. Error: largest gain of energy divided by the range of its vertical
     kinetic energy."""
 
-    def error(engine: str, folder: Path) -> float:
-        assembly = lifting_half_car(FALLING_STATE, "exact", override)
-        states = setups.run(engine, assembly, STEP, LONGEST_DURATION).states
+    def error(engine_name: str, work_folder: Path) -> float:
+        assembly = lifting_half_car(FALLING_STATE, "exact", parameter_changes)
+        states = setups.run(engine_name, assembly, STEP, LONGEST_DURATION).states
         energies = bounce_energy(assembly, states)
         return float(
             (energies - np.minimum.accumulate(energies)).max() / np.ptp(states[:, 6] ** 2 * assembly.parameters.m3 / 2)
@@ -76,70 +78,70 @@ def energy_gain_case(**override: float) -> Error:
     return error
 
 
-def motion_at_zero_load(engine: str, folder: Path) -> float:
+def motion_at_zero_load(engine_name: str, work_folder: Path) -> float:
     """Case: without gravity, wheels just touch the road at zero load. Error: largest motion, which must be 0, without
     growth of rounding errors."""
     assembly = lifting_half_car(np.zeros(8), "linear", {"g": 0.0})
-    return setups.largest_magnitude(setups.run(engine, assembly, 1e-3, 1.0).states)
+    return setups.largest_magnitude(setups.run(engine_name, assembly, 1e-3, 1.0).states)
 
 
-def thrown_up_error(engine: str, folder: Path) -> float:
+def thrown_up_error(engine_name: str, work_folder: Path) -> float:
     """Case: wheels thrown up from rest at 5 m/s. Error: largest difference of the states from the exact path."""
-    start = setups.vehicle(TWIN, "linear").initial + np.array([0, 0, 0, 0, -5.0, -5.0, 0, 0])
-    return exact_path_case(start_state=start)(engine, folder)
+    start = setups.vehicle(ASYMMETRIC_TWIN, "linear").initial + np.array([0, 0, 0, 0, -5.0, -5.0, 0, 0])
+    return exact_path_case(start_state=start)(engine_name, work_folder)
 
 
-def half_car_on_road(scene: dict[str, Any], folder: Path, step: float, duration: float) -> Assembly:
+def half_car_on_road(scene_table: dict[str, Any], work_folder: Path, time_step: float, duration: float) -> Assembly:
     """The asymmetric half car with lift-off on a road given as a scene's table."""
     return assembly_of_scene(
         build_scene(
             {
                 "title": "hard case",
-                "vehicle": {"parameters": TWIN},
-                "run": {"duration": duration, "step": step},
-                "effects": {"road": scene, "lift_off": {}},
+                "vehicle": {"parameters": ASYMMETRIC_TWIN},
+                "run": {"duration": duration, "step": time_step},
+                "effects": {"road": scene_table, "lift_off": {}},
             },
             "",
-            folder,
+            work_folder,
         )
     )
 
 
-def tight_solution_error(engine: str, assembly: Assembly, step: float, duration: float) -> float:
+def tight_solution_error(engine_name: str, assembly: Assembly, time_step: float, duration: float) -> float:
     """Largest difference of a run's states from the solution at tight tolerance; infinite if no wheel left the road."""
     states, exact = (
-        setups.run(engine, assembly, step, duration).states,
-        setups.tight_solution(assembly, step, duration).states,
+        setups.run(engine_name, assembly, time_step, duration).states,
+        setups.tight_solution(assembly, time_step, duration).states,
     )
-    air = exact[:, 0] < _road_heights(assembly.input, step, len(exact))
+    air = exact[:, 0] < _road_heights(assembly.input, time_step, len(exact))
     return setups.largest_magnitude(states - exact) if air.any() else np.inf
 
 
-def _road_heights(road: Signal | None, step: float, sample_count: int) -> np.ndarray:
+def _road_heights(road: Signal | None, time_step: float, sample_count: int) -> np.ndarray:
     """Road heights (sample_count,) in m, positive down, under the front wheel."""
-    return np.zeros(sample_count) if road is None else road.sample(0.0, step, sample_count)[:, 0]
+    return np.zeros(sample_count) if road is None else road.sample(0.0, time_step, sample_count)[:, 0]
 
 
-def coarse_road_error(engine: str, folder: Path) -> float:
+def coarse_road_error(engine_name: str, work_folder: Path) -> float:
     """Case: bumps of 80 mm at 25 m/s, from a file with a sample every 0.5 m. Error: difference of the states from the
     solution at tight tolerance."""
     s = 0.5 * np.arange(121)
     height = 0.08 * np.maximum(np.sin(2 * np.pi * s / 7.3), 0.0) * (s > 3.0)
-    write_table(folder / "bumps.csv", {"s": ("m", s), "left": ("m", height), "right": ("m", height)})
+    write_table(work_folder / "bumps.csv", {"s": ("m", s), "left": ("m", height), "right": ("m", height)})
     road = {"source": "csv", "file": "bumps.csv", "track": "left", "speed": 25.0, "beyond_end": "refused"}
-    return tight_solution_error(engine, half_car_on_road(road, folder, STEP, 1.0), STEP, 1.0)
+    return tight_solution_error(engine_name, half_car_on_road(road, work_folder, STEP, 1.0), STEP, 1.0)
 
 
-def kerb_error(engine: str, folder: Path) -> float:
+def kerb_error(engine_name: str, work_folder: Path) -> float:
     """Case: a ramp of 0.1 m height over 0.1 m length with sharp corners, at 15 m/s, which throws the front wheel off
     the road. Error: difference of the states from the solution at tight tolerance."""
     profile = PolylineProfile.through([-5.0, 3.0, 3.1, 20.0], [0.0, 0.0, -0.1, -0.1])
-    base = lifting_half_car(setups.vehicle(TWIN).initial, "exact", {})
+    base = lifting_half_car(setups.vehicle(ASYMMETRIC_TWIN).initial, "exact", {})
     road = RoadUnderWheels(profile, 15.0, base.parameters.a + base.parameters.b, (3.0, 3.1))
-    return tight_solution_error(engine, base.with_input("road", road), STEP, 0.5)
+    return tight_solution_error(engine_name, base.with_input("road", road), STEP, 0.5)
 
 
-def dropped_car_error(engine: str, folder: Path) -> float:
+def dropped_car_error(engine_name: str, work_folder: Path) -> float:
     """Case: a car with 19 degrees of freedom dropped from 0.5 m. Error: relative difference of an engine's
     accelerations along its path from the hand-written equations; for these, of the centre of mass' acceleration from
     gravity."""
@@ -149,12 +151,12 @@ def dropped_car_error(engine: str, folder: Path) -> float:
         [0.5 if freedom == "z" and car.body(name).parent is None else 0.0 for name, freedom in car.coordinates()]
     )
     written = SpatialReference(car)
-    if engine == "reference":
+    if engine_name == "reference":
         fall, motion = written.acceleration(0.0, start, np.zeros(n)), Kinematics(car)
         pull = sum(body.mass * (motion.shift(body.name, body.position)[2] @ fall + 9.81) for body in car.bodies)
         return float(abs(pull) / (9.81 * sum(body.mass for body in car.bodies)))
-    settings = setups.Settings(INTEGRATORS[engine], 5e-4, 0.5)
-    model = build_in_space(engine, car, settings)
+    settings = setups.Settings(INTEGRATORS[engine_name], 5e-4, 0.5)
+    model = build_in_space(engine_name, car, settings)
     run, worst = model.run(start, np.zeros(n)), 0.0
     for q, v in list(zip(run.positions, run.rates, strict=True))[::50]:
         wanted = written.acceleration(0.0, q, v)
@@ -162,43 +164,43 @@ def dropped_car_error(engine: str, folder: Path) -> float:
     return worst
 
 
-def hub_force_in_air(engine: str, folder: Path) -> float:
+def largest_hub_force_in_air(engine_name: str, work_folder: Path) -> float:
     """Case: hub forces on a class F road. Error: largest force (N) or moment on a hub whose wheel is in the air;
     infinite if no wheel is."""
     car = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body")
     left, right = (iso8608_road("F", seed) for seed in (1, 2))
     drive = road_under_wheels(car, left, right, 20.0, 1e-3, 1500)
-    wrenches = true_run(engine, car, drive, "inertial", 1e-3, 1.5).wrenches
+    wrenches = true_run(engine_name, car, drive, "inertial", 1e-3, 1.5).wrenches
     air = wrenches[:, :, 2] <= 0.0
     return float(np.abs(wrenches[air]).max()) if air.any() else np.inf
 
 
-def linear_tyre_naive(folder: Path) -> str:
+def linear_tyre_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: the paper's linear tyre in the same fall."""
-    assembly = setups.vehicle(TWIN, "linear", FALLING_STATE)
+    assembly = setups.vehicle(ASYMMETRIC_TWIN, "linear", FALLING_STATE)
     states, p = setups.run("reference", assembly, STEP, LONGEST_DURATION).states, assembly.parameters
     return f"the linear tyre pulls with up to {-(p.k1 * states[:, 0] + p.d1 * states[:, 4]).min():.0f} N"
 
 
-def hard_tyre_naive(folder: Path) -> str:
+def hard_tyre_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: a stable step that jumps over landings, without the check after the run."""
     with mock.patch.object(protocol, "check_resolved", lambda *_: None):
-        velocity_error = exact_path_case(2e-3, k1=2e7, k2=2e7)("reference", folder)
+        velocity_error = exact_path_case(2e-3, k1=2e7, k2=2e7)("reference", work_folder)
     return f"stable, finite, a wheel's velocity off by {velocity_error:.2g} m/s"
 
 
 THROWN_REASON = "a corner of the force within a step costs its square"
 RAISED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "raised")
 PATH, STATES = "exact path, piece by piece", "m, rad, m/s, rad/s"
-UNDAMPED = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
-HIGH_START = np.array([-5.0, -5.0, -5.0, 0.0, 12.0, 12.0, 12.0, 0.0])
-EXACT: tuple[tuple[str, str, float, Error], ...] = (
+UNDAMPED_PARAMETERS = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
+HIGH_START_STATE = np.array([-5.0, -5.0, -5.0, 0.0, 12.0, 12.0, 12.0, 0.0])
+EXACT: tuple[tuple[str, str, float, ErrorFunction], ...] = (
     ("both wheels in the air", "no tyre holds anything", 1e-4, exact_path_case()),
     (
         "fall from five metres",
         "lands at 15 m/s, many times the tyres' depth at rest",
         1e-3,
-        exact_path_case(start_state=HIGH_START),
+        exact_path_case(start_state=HIGH_START_STATE),
     ),
     ("tyres without damping", "every landing is thrown back", 1e-4, exact_path_case(d1=0.0, d2=0.0)),
     (
@@ -212,7 +214,7 @@ EXACT: tuple[tuple[str, str, float, Error], ...] = (
 )
 CASES = (
     *(
-        Case(
+        HardCase(
             name,
             hard,
             PATH,
@@ -220,20 +222,20 @@ CASES = (
             tolerance,
             THROWN_REASON,
             error,
-            naive=linear_tyre_naive if error is EXACT[0][3] else None,
+            naive_result=linear_tyre_naive_result if error is EXACT[0][3] else None,
         )
         for name, hard, tolerance, error in EXACT
     ),
-    Case(
+    HardCase(
         "bounce without any damper",
         "every error of a landing stays",
         "gains no energy",
         "of the motion",
         1e-4,
         THROWN_REASON,
-        energy_gain_case(**UNDAMPED),
+        energy_gain_case(**UNDAMPED_PARAMETERS),
     ),
-    Case(
+    HardCase(
         "tyres of 20 kN/mm, step of 2 ms",
         "stable on the road, but a landing has two steps",
         "fails, and says when",
@@ -242,9 +244,9 @@ CASES = (
         "exact",
         exact_path_case(2e-3, k1=2e7, k2=2e7),
         RAISED,
-        hard_tyre_naive,
+        hard_tyre_naive_result,
     ),
-    Case(
+    HardCase(
         "at rest at the switch",
         "no gravity: the load is zero, and every rounding switches",
         "stays at rest",
@@ -253,7 +255,7 @@ CASES = (
         "exact",
         motion_at_zero_load,
     ),
-    Case(
+    HardCase(
         "kerb with corners",
         "the road's rate jumps, and the wheels leave it",
         "tight tolerance",
@@ -263,7 +265,7 @@ CASES = (
         kerb_error,
         answer_independence="native",
     ),
-    Case(
+    HardCase(
         "bumps in a file of few samples",
         "the spline between samples throws the wheels",
         "tight tolerance",
@@ -273,7 +275,7 @@ CASES = (
         coarse_road_error,
         answer_independence="native",
     ),
-    Case(
+    HardCase(
         "car dropped in space",
         "four wheels in the air, pushed down by their springs",
         "written accelerations along the path",
@@ -282,13 +284,13 @@ CASES = (
         "the order of additions, large forces on light wheels",
         dropped_car_error,
     ),
-    Case(
+    HardCase(
         "wheels in the air above a cut",
         "a transducer feels nothing of the road",
         "no force, no moment",
         "N",
         1e-9,
         "the law has a zero there",
-        hub_force_in_air,
+        largest_hub_force_in_air,
     ),
 )

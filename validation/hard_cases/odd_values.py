@@ -35,33 +35,33 @@ from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases.between_steps import REFUSED, refused_case
-from validation.hard_cases.case import Case
+from validation.hard_cases.case import HardCase
 
 FRICTION, CELLS = 0.3, 15
 
 
-def long_wave_error(implementation: str, folder: Path) -> float:
+def long_wave_error(engine_name: str, work_folder: Path) -> float:
     """Case: nonlinear quarter cars on two roads that differ only in waves longer than 60 m. Error: largest relative
     difference of the standard deviations.
 
     The longer waves reach up to 10 m, from which cars that began at 0 would fall.
     """
-    deviations = [_run_copies(corner).deviation for corner in (1e-6, 0.1)]
+    deviations = [_monte_carlo_run(corner).deviation for corner in (1e-6, 0.1)]
     return float(np.abs(deviations[0] / deviations[1] - 1.0).max())
 
 
-def _run_copies(corner: float) -> Any:
-    vehicle, road = _vehicle_and_road(corner)
+def _monte_carlo_run(corner_wavenumber: float) -> Any:
+    vehicle, road = _vehicle_and_road(corner_wavenumber)
     return copies_in_time(vehicle, road, 5.0, 1.0, copy_count=20, seed=1, longest_step=2e-3)
 
 
-def _vehicle_and_road(corner: float) -> tuple[SpatialVehicle, Excitation]:
+def _vehicle_and_road(corner_wavenumber: float) -> tuple[SpatialVehicle, Excitation]:
     scene = build(
         {
             "title": "hard",
             "system": "ride",
             "vehicle": {"file": "quarter_car_nonlinear"},
-            "road": {"level": 6.4e-5, "corner_mean": corner, "corner_roll": corner},
+            "road": {"level": 6.4e-5, "corner_mean": corner_wavenumber, "corner_roll": corner_wavenumber},
             "speeds": {"start": 5.0, "stop": 6.0},
         }
     )
@@ -73,7 +73,7 @@ def slender_ellipse_case(a: float, b: float) -> Callable[[str, Path], float]:
     """Case: a contact ellipse with semi-axes a, b (m) under spin. Error: difference of FASTSIM from the exact theory
     divided by its stated error."""
 
-    def error(implementation: str, folder: Path) -> float:
+    def error(engine_name: str, work_folder: Path) -> float:
         pair = MaterialPair()
         hertz, motion = by_axes(a, b, pair, load=1e5), (0.0, 1e-3, 0.5)
         choices: dict[str, Any] = {"flexibilities": "blended", "bound": "intermediate", "march": "second-order"}
@@ -90,7 +90,7 @@ def slender_ellipse_case(a: float, b: float) -> Callable[[str, Path], float]:
     return error
 
 
-def scaled_drift_off_error(implementation: str, folder: Path) -> float:
+def scaled_drift_off_error(engine_name: str, work_folder: Path) -> float:
     """Case: drift-off times with noise and angle scaled together over 300 decades. Error: relative difference of the
     times, which must be equal."""
     off_time = drift_off_time(0.3, 1e-5, 1e-3)
@@ -98,7 +98,7 @@ def scaled_drift_off_error(implementation: str, folder: Path) -> float:
     return float(np.abs(np.array(scaled) / off_time - 1.0).max())
 
 
-def overconfident_filter_ratio(implementation: str, folder: Path) -> float:
+def overconfident_filter_ratio(engine_name: str, work_folder: Path) -> float:
     """Case: a tilt filter with stated deviations of 1e-12 for angles and rates, and force noise of 1 N or 8 N. Error:
     the filter's deviations divided by the stated ones."""
     vehicle, angles = cut(load_vehicle("r19_free"), "body"), MeasuredAngles(np.zeros((5000, 4)), 2e-3)
@@ -112,15 +112,15 @@ def overconfident_filter_ratio(implementation: str, folder: Path) -> float:
     return max(float(np.nan_to_num(fit.deviations / 1e-12, nan=np.inf).max()) for fit in fits)
 
 
-def flipped_bit_error(implementation: str, folder: Path) -> float:
+def flipped_bit_error(engine_name: str, work_folder: Path) -> float:
     """Case: a bit of a saved result was changed on the disk; loading must be refused. Error: largest change of the
     values."""
     heave = np.linspace(1.0, 2.0, 64)
-    Result(xr.Dataset({"z3": ("time", heave)}, {"time": ("time", np.arange(64.0))})).save(folder / "run.nc")
-    content = bytearray((folder / "run.nc").read_bytes())
+    Result(xr.Dataset({"z3": ("time", heave)}, {"time": ("time", np.arange(64.0))})).save(work_folder / "run.nc")
+    content = bytearray((work_folder / "run.nc").read_bytes())
     content[content.index(heave.tobytes()) + 100] ^= 4
-    (folder / "run.nc").write_bytes(content)
-    return float(np.abs(load(folder / "run.nc")["z3"] - heave).max())
+    (work_folder / "run.nc").write_bytes(content)
+    return float(np.abs(load(work_folder / "run.nc")["z3"] - heave).max())
 
 
 def profile_with_spike() -> Any:
@@ -136,11 +136,11 @@ def rounded_profile() -> Any:
     return profile_of_points(rail.y.round(4), rail.z.round(4))
 
 
-MASKED = np.ma.array([0.0, 100.0, 0.0, 1.0, 0.0], mask=np.arange(5) == 1)
-SKEW = np.array([[1.0, 2.0], [0.0, 1.0]])
-STABLE = np.array([[0.0, 1.0], [-4.0, -0.5]])
+MASKED_SAMPLES = np.ma.array([0.0, 100.0, 0.0, 1.0, 0.0], mask=np.arange(5) == 1)
+SKEW_MATRIX = np.array([[1.0, 2.0], [0.0, 1.0]])
+STABLE_MATRIX = np.array([[0.0, 1.0], [-4.0, -0.5]])
 CASES = (
-    Case(
+    HardCase(
         "road that begins 10 m up",
         "vehicles let go at 0 fall onto it and ring for long",
         "as on one without its long waves",
@@ -148,9 +148,9 @@ CASES = (
         0.02,
         "waves of 60 m at 0.1 Hz",
         long_wave_error,
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "narrow contact",
         "an ellipse 20 times as wide as long: FASTSIM's moment is two and a half times too large",
         "within its stated error of the exact theory",
@@ -158,9 +158,9 @@ CASES = (
         1.0,
         "exact",
         slender_ellipse_case(5e-4, 1e-2),
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "drift-off time under tiny noise",
         "squares of angles underflow",
         "the same by scaling",
@@ -168,9 +168,9 @@ CASES = (
         1e-12,
         "rounding",
         scaled_drift_off_error,
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "filter of tilts told of them to 1e-12",
         "subtracted covariances leave less than nothing",
         "surer than each value, never less",
@@ -178,9 +178,9 @@ CASES = (
         1.0 + 1e-9,
         "rounding",
         overconfident_filter_ratio,
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "saved result with a flipped bit",
         "every number of it is plausible",
         "refused",
@@ -189,14 +189,14 @@ CASES = (
         "exact",
         flipped_bit_error,
         REFUSED,
-        without_engine=True,
+        is_without_engine=True,
     ),
     *(
-        Case(name, hard, "refused", "", 0.0, "exact", refused_case(answer), REFUSED, without_engine=True)
+        HardCase(name, hard, "refused", "", 0.0, "exact", refused_case(answer), REFUSED, is_without_engine=True)
         for name, hard, answer in (
             ("profile with a spike", "a spline swings about it", profile_with_spike),
             ("profile rounded to 0.1 mm", "the half beyond the first step back would be lost", rounded_profile),
-            ("masked samples", "would be counted", lambda: pseudo_damage(MASKED)),
+            ("masked samples", "would be counted", lambda: pseudo_damage(MASKED_SAMPLES)),
             ("load below 0 under a wheel", "its factor would be negative", lambda: dynamic_load_factor(100.0, -4000.0)),
             ("limit below 0", "a share of time above 1", lambda: time_share_beyond(1.0, -1.0)),
             ("deviation of two values", "its error would be 0", lambda: deviation_with_error(np.array([1.0, 2.0]))),
@@ -208,9 +208,13 @@ CASES = (
             (
                 "covariance of what grows",
                 "Lyapunov's equation has an answer, which is none",
-                lambda: lyapunov_solution(-STABLE, np.eye(2)),
+                lambda: lyapunov_solution(-STABLE_MATRIX, np.eye(2)),
             ),
-            ("right side that is askew", "another one would be solved", lambda: lyapunov_solution(STABLE, SKEW)),
+            (
+                "right side that is askew",
+                "another one would be solved",
+                lambda: lyapunov_solution(STABLE_MATRIX, SKEW_MATRIX),
+            ),
             ("point mass of nothing", "divided by", lambda: euler_covariance(10, 1.0, 1e-3, 0.0)),
         )
     ),

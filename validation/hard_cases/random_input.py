@@ -30,8 +30,8 @@ from models.sensors.rotations import rotation_matrix
 from models.systems.ride.of_scene import linear_vehicle
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases import setups
-from validation.hard_cases.case import Case
-from validation.hard_cases.setups import driven_by_forces, largest_magnitude, settings, static_forces
+from validation.hard_cases.case import HardCase
+from validation.hard_cases.setups import driven_by_forces, largest_magnitude, run_settings, static_forces
 
 NORMAL_LIMIT = 3.29
 """Number of standard errors that a normal value exceeds once in a thousand."""
@@ -41,12 +41,12 @@ WALK, PATHS, SAMPLES, SAMPLING_RATE = 0.5, 600, 100, 50.0
 rotation falls from 3 to 1.8."""
 
 
-def repeated_call_difference(engine: str, folder: Path) -> float:
+def repeated_call_difference(engine_name: str, work_folder: Path) -> float:
     """Case: accelerations with force noise of 800 N, evaluated forwards, backwards and twice in time. Error: largest
     difference, which must be 0."""
     base = setups.vehicle("asymmetric_twin")
-    forces = static_forces(base, 200, 1e-3, noise=800.0)
-    model = build(engine, driven_by_forces(base, forces), settings(engine, 1e-3, 0.1))
+    forces = static_forces(base, 200, 1e-3, noise_deviation=800.0)
+    model = build(engine_name, driven_by_forces(base, forces), run_settings(engine_name, 1e-3, 0.1))
     states = base.initial + 1e-3 * np.random.default_rng(3).standard_normal((40, 8))
     arguments_of_calls = [(2e-3 * i, state[:4], state[4:]) for i, state in enumerate(states)]
     once = [model.acceleration(*arguments).copy() for arguments in arguments_of_calls]
@@ -54,7 +54,7 @@ def repeated_call_difference(engine: str, folder: Path) -> float:
     return largest_magnitude(np.array(once) - reversed_answers)
 
 
-def stream_correlation(implementation: str, folder: Path) -> float:
+def stream_correlation(engine_name: str, work_folder: Path) -> float:
     """Case: noise streams of several seeds, paths and sources. Error: largest correlation between two streams, divided
     by the size that chance allows among so many pairs."""
     paths = [
@@ -73,7 +73,7 @@ def stream_correlation(implementation: str, folder: Path) -> float:
     return worst / 4.75  # one pair of 105 beyond 4.75 errors once in 5000
 
 
-def stream_piece_error(implementation: str, folder: Path) -> float:
+def stream_piece_error(engine_name: str, work_folder: Path) -> float:
     """Case: a noise stream read in pieces of odd lengths, the last first. Error: difference from the complete
     stream."""
     complete_stream, edges = (
@@ -92,11 +92,11 @@ def stream_piece_error(implementation: str, folder: Path) -> float:
     return float(np.abs(np.concatenate(parts[::-1]) - complete_stream).max())
 
 
-def _one_state() -> Excitation:
+def _first_order_road() -> Excitation:
     return Excitation(np.array([[-CORNER]]), np.array([[Q**0.5]]), (np.ones((1, 1)),), (0.0,))
 
 
-def road_variance_error(implementation: str, folder: Path) -> float:
+def road_variance_error(engine_name: str, work_folder: Path) -> float:
     """Case: roads with half steps of 1e-3 to 30 corner lengths. Error: difference of the variance from q / (2 corner),
     in standard errors."""
     worst = 0.0
@@ -104,26 +104,26 @@ def road_variance_error(implementation: str, folder: Path) -> float:
         keeps = np.exp(
             -2.0 * step_share
         )  # squared correlation of neighbours: n samples count as n (1 - keeps) / (1 + keeps)
-        road = RoadPath(_one_state(), SPEED, step_share / (CORNER * SPEED)).wheel_heights_and_rates(20_000, seed=12)[
-            :, 0
-        ]
+        road = RoadPath(_first_order_road(), SPEED, step_share / (CORNER * SPEED)).wheel_heights_and_rates(
+            20_000, seed=12
+        )[:, 0]
         error = (2.0 / len(road) * (1.0 + keeps) / (1.0 - keeps)) ** 0.5
         worst = max(worst, abs(float(np.mean(road**2)) / (Q / (2.0 * CORNER)) - 1.0) / error)
     return worst
 
 
-def any_step_naive(folder: Path) -> str:
+def any_step_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: variance by explicit Euler, which is 1 / (1 - part / 2) of the true one."""
     return f"explicit Euler at 0.9 corner lengths has {1.0 / (1.0 - 0.45):.2f} times the variance, at 2.5 none at all"
 
 
-def axle_delay_error(implementation: str, folder: Path) -> float:
+def axle_delay_error(engine_name: str, work_folder: Path) -> float:
     """Case: a wheelbase that is no multiple of the steps. Error: relative difference between the delay of the rear axle
     and the wheelbase; infinite if the axles' heights differ."""
     worst = 0.0
     for length, speed, longest in ((2.7, 31.0, 0.02), (3.1415926, 17.3, 0.0055), (1.234567, 0.37, 0.001)):
         heights = (np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]]))
-        road = road_path(replace(_one_state(), heights=heights, lengths=(0.0, length)), speed, longest)
+        road = road_path(replace(_first_order_road(), heights=heights, lengths=(0.0, length)), speed, longest)
         steps = int(2.0 * length / (speed * road.step)) + 50
         front, rear = road.wheel_heights_and_rates(steps, seed=3)[:, :2].T
         lag = next((i for i in range(1, len(front)) if np.array_equal(rear[i : i + 20], front[:20])), 0)
@@ -131,14 +131,14 @@ def axle_delay_error(implementation: str, folder: Path) -> float:
     return worst
 
 
-def odd_delay_naive(folder: Path) -> str:
+def odd_delay_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: distance between the axles if the delay is rounded to steps of 20 ms."""
     length, speed, step = 2.7, SPEED, 0.02
     lag = round(length / (speed * step)) * speed * step
     return f"rounded to steps of 20 ms the axles stand {lag:.2f} m apart in place of {length} m"
 
 
-def attitude_error(implementation: str, folder: Path) -> float:
+def attitude_error(engine_name: str, work_folder: Path) -> float:
     """Case: a noisy gyro on a rotating body. Error: difference of the mean trace of its attitude error from 3 exp(-s^2
     t), in standard errors."""
     rates = np.tile([0.0, 0.0, 2.0], (SAMPLES, 1))
@@ -150,7 +150,7 @@ def attitude_error(implementation: str, folder: Path) -> float:
     return abs(float(traces.mean()) - wanted) / (float(traces.std()) / PATHS**0.5)
 
 
-def attitude_naive(folder: Path) -> str:
+def attitude_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: norm of a quaternion that is integrated by explicit Euler."""
     turns = WALK / SAMPLING_RATE**0.5 * np.stack([normal_samples(5, path, SAMPLES, 3) for path in range(PATHS)], axis=1)
     q = quaternions_by_euler_steps(turns, np.array([1.0, 0.0, 0.0, 0.0]))
@@ -161,7 +161,7 @@ def attitude_naive(folder: Path) -> str:
     )
 
 
-def growth_law_error(implementation: str, folder: Path) -> float:
+def growth_law_error(engine_name: str, work_folder: Path) -> float:
     """Case: the pitch variance for 2 lambda t of 1e-12 to 600, below and above the switch to its series. Error:
     relative difference from values with 60 digits."""
     worst = 0.0
@@ -179,27 +179,27 @@ def growth_law_error(implementation: str, folder: Path) -> float:
         600.0,
     ):
         variance = float(pitch_variance(2.0, x / 4.0, 0.7))
-        worst = max(worst, abs(variance / _exact_law(Decimal(x)) - 1.0))
+        worst = max(worst, abs(variance / _exact_growth_law(Decimal(x)) - 1.0))
     return max(worst, abs(float(pitch_variance(2.0, 0.0, 0.7)) / (0.7 * 8.0 / 3.0) - 1.0))
 
 
-def _exact_law(x: Decimal) -> float:
+def _exact_growth_law(x: Decimal) -> float:
     with localcontext() as context:
         context.prec = 60
         sinh = (x.exp() - (-x).exp()) / 2
         return float(Decimal("0.7") * 8 / 3 * 6 * (sinh - x) / x**3)
 
 
-def no_growth_naive(folder: Path) -> str:
+def no_growth_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: the variance without growth by the formula as printed."""
     x = 1e-8
     return f"the closed law as printed is {6.0 * (np.sinh(x) - x) / x**3:.2f} times the truth at 2 lambda t = 1e-8"
 
 
-def negative_eigenvalue_share(implementation: str, folder: Path) -> float:
+def negative_eigenvalue_share(engine_name: str, work_folder: Path) -> float:
     """Case: the half car's covariance at 2 to 60 m/s. Error: magnitude of its most negative eigenvalue divided by the
     largest, with states scaled by their deviations."""
-    vehicle = linear_vehicle(load_vehicle("half_car"), implementation)
+    vehicle = linear_vehicle(load_vehicle("half_car"), engine_name)
     worst = 0.0
     for speed in (2.0, 7.0, 20.0, 60.0):
         half_car = vehicle(speed)
@@ -215,7 +215,7 @@ def negative_eigenvalue_share(implementation: str, folder: Path) -> float:
 
 
 CASES = (
-    Case(
+    HardCase(
         "accelerations asked again",
         "noise drawn inside a callback changes from one stage to the next",
         "the same time and state, the same bits",
@@ -224,7 +224,7 @@ CASES = (
         "a function has no memory",
         repeated_call_difference,
     ),
-    Case(
+    HardCase(
         "streams of noise",
         "one seed for forces, gyro and road, two for two runs, one path for front and rear",
         "no correlation of any two of 15",
@@ -233,9 +233,9 @@ CASES = (
         "once in 5000 by chance, fixed seeds",
         stream_correlation,
         answer_independence="none",
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "stream in pieces",
         "blocks may be asked for in any order by any worker",
         "the whole, bit by bit",
@@ -244,9 +244,9 @@ CASES = (
         "the same numbers",
         stream_piece_error,
         answer_independence="none",
-        without_engine=True,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "shape filter at any step",
         "explicit Euler has 1 / (1 - a h / 2) of the variance",
         "q / (2 corner) at half steps of 0.001 to 30 corner lengths",
@@ -254,10 +254,10 @@ CASES = (
         NORMAL_LIMIT + 0.6,
         "once in a thousand by chance in five lengths, fixed seed",
         road_variance_error,
-        naive=any_step_naive,
-        without_engine=True,
+        naive_result=any_step_naive_result,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "delay between steps",
         "the wheelbase is no whole number of steps",
         "the rear axle meets the front one's heights, its wheelbase later",
@@ -265,10 +265,10 @@ CASES = (
         1e-3,
         "the tolerance of the cells of the path",
         axle_delay_error,
-        naive=odd_delay_naive,
-        without_engine=True,
+        naive_result=odd_delay_naive_result,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "white noise on a gyro",
         "Ito and Stratonovich differ, and a quaternion grows",
         "E[tr E] = 3 exp(-s^2 t) on a turning body",
@@ -276,10 +276,10 @@ CASES = (
         NORMAL_LIMIT,
         "once in a thousand, fixed seed",
         attitude_error,
-        naive=attitude_naive,
-        without_engine=True,
+        naive_result=attitude_naive_result,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "growth law at no growth",
         "sinh x - x loses all digits where the exponent 3/2 begins",
         "60 digits, for 2 lambda t from 0 to 600",
@@ -287,10 +287,10 @@ CASES = (
         1e-12,
         "rounding of sinh x - x at x = 0.1 is 6e-14",
         growth_law_error,
-        naive=no_growth_naive,
-        without_engine=True,
+        naive_result=no_growth_naive_result,
+        is_without_engine=True,
     ),
-    Case(
+    HardCase(
         "delayed axle in Lyapunov's equation",
         "its right side is indefinite: roots of it do not exist",
         "the covariance is positive semidefinite at 2 to 60 m/s",

@@ -10,24 +10,28 @@ from typing import Any
 
 import numpy as np
 
-from validation.hard_cases.case import Case
+from validation.hard_cases.case import HardCase
 from validation.measured import planted as bench
 
 ROAD: bench.Ride = ("C", 1, 20.0, 5.0)
-SIZE = 0.2
+FAULT_SIZE_TOLERANCE = 0.2
 
 
 def planted_fault_case(
-    check: str, expected_place: str, fault_size: float | None, spoil: bench.Spoil | None = None, **faults: Any
+    check_name: str,
+    expected_place: str,
+    fault_size: float | None,
+    spoil_recording: bench.Spoil | None = None,
+    **planted_faults: Any,
 ) -> Callable[[str, Path], float]:
     """Case: a recording with one planted fault. Error: relative error of the size that the check finds; infinite unless
-    ``check`` reports the fault first, and all findings name ``expected_place``."""
+    ``check_name`` reports the fault first, and all findings name ``expected_place``."""
 
-    def error(implementation: str, folder: Path) -> float:
-        findings = bench.planted_findings(bench.measurement(road=ROAD), folder, spoil, **faults)
+    def error(engine_name: str, work_folder: Path) -> float:
+        findings = bench.planted_findings(bench.measurement(road=ROAD), work_folder, spoil_recording, **planted_faults)
         if (
             not findings
-            or findings[0].check != check
+            or findings[0].check != check_name
             or not all(expected_place in finding.place for finding in findings)
         ):
             return np.inf
@@ -36,13 +40,13 @@ def planted_fault_case(
     return error
 
 
-def clean_recording_findings(implementation: str, folder: Path) -> float:
+def clean_recording_findings(engine_name: str, work_folder: Path) -> float:
     """Case: a recording without faults. Error: number of errors and doubts that the check reports."""
-    return float(len(bench.planted_findings(bench.measurement(road=ROAD), folder)))
+    return float(len(bench.planted_findings(bench.measurement(road=ROAD), work_folder)))
 
 
 CASES = (
-    Case(
+    HardCase(
         "clean recording",
         "a check that always cries is no check",
         "no error, no doubt",
@@ -50,10 +54,19 @@ CASES = (
         0.0,
         "noise as stated, nothing planted",
         clean_recording_findings,
-        without_engine=True,
+        is_without_engine=True,
     ),
     *(
-        Case(name, hard, check, "of its size", SIZE, "what was planted, 20 %", error, without_engine=True)
+        HardCase(
+            name,
+            hard,
+            check,
+            "of its size",
+            FAULT_SIZE_TOLERANCE,
+            "what was planted, 20 %",
+            error,
+            is_without_engine=True,
+        )
         for name, hard, check, error in (
             (
                 "wheel force in kN read as N",

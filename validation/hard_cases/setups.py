@@ -26,23 +26,23 @@ RAISED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "raised")
 
 
 def vehicle(
-    parameters: str = "itwm_drift",
+    parameter_set: str = "itwm_drift",
     geometry: str = "exact",
-    initial: np.ndarray | None = None,
+    start_state: np.ndarray | None = None,
     effects: dict[str, Any] | None = None,
-    **override: float,
+    **parameter_changes: float,
 ) -> Assembly:
     """The pitch-plane vehicle on a flat road, at rest or in an initial state (8,)."""
     scene = build_scene(
         {
             "title": "hard case",
-            "vehicle": {"parameters": parameters, "geometry": geometry, "override": override},
+            "vehicle": {"parameters": parameter_set, "geometry": geometry, "override": parameter_changes},
             "run": {"duration": 1.0},
             "effects": effects or {},
         }
     )
     assembly = assembly_of_scene(scene)
-    return assembly if initial is None else replace(assembly, initial=np.array(initial, dtype=float))
+    return assembly if start_state is None else replace(assembly, initial=np.array(start_state, dtype=float))
 
 
 def driven_by_forces(base_assembly: Assembly, forces: Signal, drive_mode: Mode = "force") -> Assembly:
@@ -68,7 +68,7 @@ def static_forces(
     sample_count: int,
     sample_period: float,
     is_held: bool = True,
-    noise: float = 0.0,
+    noise_deviation: float = 0.0,
     seed: int = 1,
 ) -> Sampled:
     """Wheel forces (sample_count, 2) in N that carry the vehicle, with independent noise of a standard deviation (N) on
@@ -76,37 +76,53 @@ def static_forces(
     p, z = base_assembly.parameters, base_assembly.initial
     carried = np.array([p.k1 * z[0], p.k2 * z[1]])
     return Sampled(
-        carried + noise * np.random.default_rng(seed).standard_normal((sample_count, 2)), sample_period, is_held
+        carried + noise_deviation * np.random.default_rng(seed).standard_normal((sample_count, 2)),
+        sample_period,
+        is_held,
     )
 
 
-def settings(engine: str, step: float, duration: float, integrator: str = "", **options: float) -> Settings:
+def run_settings(
+    engine_name: str, time_step: float, duration: float, integrator: str = "", **solver_options: float
+) -> Settings:
     """Settings of a run in an engine; the recommended integrator is the default; step and duration in s."""
-    return Settings(integrator or RECOMMENDED[engine], step, duration, **options)
+    return Settings(integrator or RECOMMENDED[engine_name], time_step, duration, **solver_options)
 
 
 def run(
-    engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **options: float
+    engine_name: str,
+    assembly: Assembly,
+    time_step: float,
+    duration: float,
+    integrator: str = "",
+    **solver_options: float,
 ) -> Trajectory:
     """Trajectory of a run with all checks that a user's run has, so that it may be refused."""
-    return build(engine, assembly, settings(engine, step, duration, integrator, **options)).run()
+    return build(
+        engine_name, assembly, run_settings(engine_name, time_step, duration, integrator, **solver_options)
+    ).run()
 
 
 def unchecked_run(
-    engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **options: float
+    engine_name: str,
+    assembly: Assembly,
+    time_step: float,
+    duration: float,
+    integrator: str = "",
+    **solver_options: float,
 ) -> Trajectory:
     """Trajectory of a run without the checks before it; only the guard after the run is active."""
-    engine_settings = settings(engine, step, duration, integrator, **options)
-    return build_unchecked(engine, assembly, engine_settings).run()
+    engine_settings = run_settings(engine_name, time_step, duration, integrator, **solver_options)
+    return build_unchecked(engine_name, assembly, engine_settings).run()
 
 
-def tight_solution(assembly: Assembly, step: float, duration: float) -> Trajectory:
+def tight_solution(assembly: Assembly, time_step: float, duration: float) -> Trajectory:
     """Independent trajectory by the paper's equations with order 8 at a relative tolerance of 1e-12, with rows every
-    ``step`` (s)."""
-    return run("reference", assembly, step, duration, "DOP853", tolerance=1e-12)
+    ``time_step`` (s)."""
+    return run("reference", assembly, time_step, duration, "DOP853", tolerance=1e-12)
 
 
-def exact_states(assembly: Assembly, step: float, step_count: int, forces: np.ndarray | None = None) -> np.ndarray:
+def exact_states(assembly: Assembly, time_step: float, step_count: int, forces: np.ndarray | None = None) -> np.ndarray:
     """Exact states (step_count + 1, 8) of the linearised vehicle, by the matrix exponential.
 
     forces (step_count, 2) in N are held over each step; None is the vehicle on the flat road.
@@ -118,7 +134,7 @@ def exact_states(assembly: Assembly, step: float, step_count: int, forces: np.nd
         push[:, :2] -= forces
     block = np.zeros((16, 16))
     block[:8, :8], block[:8, 8:] = first_order(linear), np.eye(8)
-    transition = expm(block * step)
+    transition = expm(block * time_step)
     states = [assembly.initial]
     for row in push:
         rate = np.concatenate((np.zeros(4), row / linear[0].diagonal()))
@@ -134,9 +150,9 @@ def exact_decay(assembly: Assembly, times: np.ndarray) -> np.ndarray:
     return rest_state + ((np.exp(np.outer(times, poles)) * shares) @ shapes.T).real
 
 
-def largest_magnitude(difference: np.ndarray) -> float:
+def largest_magnitude(values: np.ndarray) -> float:
     """Largest magnitude of an array's entries."""
-    return float(np.abs(difference).max())
+    return float(np.abs(values).max())
 
 
 def root_mean_square(values: np.ndarray) -> float:
