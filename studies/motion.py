@@ -320,7 +320,7 @@ def _rigidity_text(readings_quality: RigidFitQuality) -> str:
         )
     if readings_quality.suspect_sensor:
         return (
-            f"{share} (allowed: {100 * UNEXPLAINED_SHARE_LIMIT:g} %): {quality.suspect_sensor!r} does not move "
+            f"{share} (allowed: {100 * UNEXPLAINED_SHARE_LIMIT:g} %): {readings_quality.suspect_sensor!r} does not move "
             "with the body and is left out"
         )
     return (

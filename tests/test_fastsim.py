@@ -111,9 +111,9 @@ def test_the_moment_reaches_the_limit_of_friction_and_no_more():
 def test_derivatives_are_those_of_the_march(kind, growing):
     given = case.creepage_contacts(tuple(case.CREEPAGE_KINDS), (0.2, 2.0))
     own = (
-        creep_force_derivatives(
-            RollingEllipse(**given), PAIR, flexibilities=kind, axes_grow_with_load=axes_grow_with_load
-        ).slopes[..., 3]
+        creep_force_derivatives(RollingEllipse(**given), PAIR, flexibilities=kind, axes_grow_with_load=growing).slopes[
+            ..., 3
+        ]
         * case.NORMAL_LOAD
     )
     ends = []

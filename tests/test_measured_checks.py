@@ -27,7 +27,7 @@ from models.measured.columns import SampleFile
 from models.measured.faults_of_measurement import SimulatedFaults
 from models.measured.ratios import probable_mistake
 from models.measured.recording import Recording
-from models.measured.signal import Quantity, Signal, TransducerPlace
+from models.measured.signal import MeasuredSignal, Quantity, TransducerPlace
 from models.systems.hub_forces.tilt_filter import StatedDeviations, TiltFilter
 from models.systems.measured.consequences import CORRECTION_OF_CHECK, Consequence, consequence_texts
 from models.systems.measured.inputs import RecordingInputs

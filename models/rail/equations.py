@@ -174,11 +174,11 @@ def _add_suspension_forces(wheelset_state, wheelset_body, angular_velocity, axle
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
-def march(wheelset_state, parameters, time_steps, path_states, contact_reports, workspace, stages):
-    """Integrate from ``wheelset_state`` by RK4; the wheelset_state is modified. Returns the number of steps made.
+def march(wheelset_state, parameters, time_steps, path_states, contact_reports, contact_workspace, runge_kutta_arrays):
+    """Integrate from ``wheelset_state`` by RK4; the state is modified. Returns the number of steps made.
 
     parameters : of ``Equations``; time_steps : length (s) of a step, count of steps, and after how many steps one
-    goes into path and reports; workspace, stages : arrays of the caller, to which no reference is held, which saves
+    goes into path and reports; contact_workspace, runge_kutta_arrays : arrays of the caller, to which no reference is held, which saves
     5 % of the time of a bare wheelset."""
     (speed, plain_body, plain_tuples), (step, count, stride), (total, rate, stage_state, no_report) = (
         parameters,
