@@ -13,7 +13,7 @@ from models.measured.columns import SampleFile
 from models.measured.faults_of_measurement import SimulatedFaults, check_faults, measured_samples
 from models.measured.gaps import filled_samples
 from models.measured.recording import Recording
-from models.measured.signal import Quantity, Signal
+from models.measured.signal import MeasuredSignal, Quantity
 from models.systems.measured.inputs import RecordingInputs, StepGrid
 from models.systems.measured.pitch_plane import PlaneRunSettings
 from models.systems.measured.pitch_plane import run as plane_run

@@ -233,9 +233,6 @@ def constant_torque_stop(
         if brake_torque > 0.0
         else 1000
     )
-    return braked(
-        quarter_car, tyre_table[1], UNIFORM_ROAD, np.full(steps + 1, brake_torque), time_step, speed, rim_turning
-    )
     return stop_of_quarter_vehicle(
-        quarter_car, tyre[1], UNIFORM_ROAD, np.full(steps + 1, torque), step, speed, rim_turning
+        quarter_car, tyre_table[1], UNIFORM_ROAD, np.full(steps + 1, brake_torque), time_step, speed, rim_turning
     )

@@ -86,7 +86,7 @@ def braked_truck_turn(
         on_road(PAPER_PLANE, stacked_tables([ICE_TABLE]), cornering_slope=ICE_TABLE.cornering),
         START_SPEED,
         steer=steer_angle,
-        advance_step=advance_step,
+        advance_step=step_function,
     )
     while True:
         passed, position, fast = truck.time, truck.state[0].copy(), truck.speed

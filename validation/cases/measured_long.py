@@ -153,7 +153,7 @@ def _equal_blocks_row(work_folder: Path, engine_name: str, stabiliser: str, reco
     hold = AttitudeHold(stabiliser)  # type: ignore[arg-type]
     job = section_run_of_recording(run_folder, recording_seconds, PATTERN_SECONDS, engine_name, hold)
     bits = []
-    for block in (60.0, 0.073):
+    for block_duration in (60.0, 0.073):
         name = f"{engine_name} {stabiliser} {block_duration}"
         run(job, run_folder / name, block_duration=block_duration)
         bits.append(np.frombuffer(computed_channel_bytes(run_folder, name), np.int64))

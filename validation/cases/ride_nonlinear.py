@@ -153,7 +153,7 @@ def _road_level_rows(road_level: float, quick: bool) -> tuple[list[Row], list[st
     Carlo. The tolerance of each is the accuracy that the result states."""
     vehicle, road = vehicle_and_road(NONLINEAR_VEHICLE, road_level)
     linear = statistically_linear(vehicle, road, SPEED)
-    copy_count = copies_in_time(
+    copies = copies_in_time(
         vehicle,
         road,
         SPEED,
@@ -207,7 +207,7 @@ def _linear_springs_row() -> Row:
     """Row: with linear springs, the variances of the Monte Carlo copies agree with the covariance."""
     vehicle, road = vehicle_and_road("quarter_car")
     exact = stationary_covariance(vehicle_with_road(linearise(vehicle), road, SPEED))
-    copy_count = copies_in_time(
+    copies = copies_in_time(
         vehicle, road, SPEED, MONTE_CARLO_COPY_SECONDS[1], copy_count=MONTE_CARLO_COPY_COUNTS[1], seed=SEED
     )
     return Observed(
@@ -237,7 +237,7 @@ def _single_law_rows() -> list[Row]:
         alone = replace(vehicle, springs=(replace(spring, **laws),))
         road = vehicle_and_road(NONLINEAR_VEHICLE, level)[1]
         linear = statistically_linear(alone, road, SPEED)
-        copy_count = copies_in_time(
+        copies = copies_in_time(
             alone, road, SPEED, MONTE_CARLO_COPY_SECONDS[1], copy_count=MONTE_CARLO_COPY_COUNTS[1] // 2, seed=SEED
         )
         error = np.abs(linear.covariance.deviation / copies.deviation - 1.0)

@@ -133,7 +133,7 @@ def run(
         return _table_result(scene, answers, report_progress, error)
     motions, cells = swept_creepages(scene), scene.method.cells
     report_progress("loading", 0.0)
-    shown = rolled_with_errors(solved_contact(scene), motions[-1], cells, with_fields=True) if with_fields else None
+    shown = rolled_with_errors(solved_contact(scene), motions[-1], cells, with_fields=True) if fields else None
     begun, start = time.process_time(), time.perf_counter()
     contact = solved_contact(scene)
     steps, marks = list[tuple[RollingResult, ContactErrors | None]](), [time.perf_counter()]
