@@ -210,7 +210,7 @@ def _recover_motions(
         filtered_rates, _ = filter_rates(
             body_rotation_from_readings(accelerometers, readings),
             readings_source.sample_period,
-            np.accelerometers(readings_source.start_state.rates),
+            np.array(readings_source.start_state.rates),
             parameters.deviation,
         )
         readings_source.recovered_motions["rates held by w w^T"] = recover(

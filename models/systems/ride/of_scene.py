@@ -132,7 +132,7 @@ def road_of(scene: RideScene, wheel_positions: tuple[WheelPosition, ...]) -> Two
         half_track_of(scene, wheel_positions),
         level,
         corner_wavenumbers=(road.corner_mean, road.corner_roll),
-        cutoff_wavenumber=road.cutoff_wavenumber,
+        cutoff_wavenumber=road.cutoff,
     )
 
 
