@@ -129,7 +129,7 @@ def test_a_search_ends_where_its_runs_are_spent_and_says_so(monkeypatch):
         return 100.0 + (0.1 if "e00" in left_out else 0.0) + 50.0 * len(left_out - {"e00"})
 
     found, shares = chooser(monkeypatch, quantity, names), []
-    found.progress = shares.append
+    found.report_progress = shares.append
     choice = found.choose()
     own = found.whole.variants.quantities_of_run().counts["calls"]
     assert choice.ended_early and choice.left_out == ("e00",) and choice.within_tolerance
