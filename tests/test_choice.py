@@ -219,7 +219,11 @@ def test_what_only_rounds_does_not_move():
     answer = RunQuantities(
         {"a": Quantity("N", (np.array([5e4, 5e4 + 1e-7]),)), "b": Quantity("m", (np.zeros(2),))}, {}, 0.0
     )
-    assert reference_sizes_of_cases(answer.quantity("a").cases)[0] < rounding_floor(answer, "N") == pytest.approx(5e-6)
+    assert (
+        reference_sizes_of_cases(answer.quantity("a").case_values)[0]
+        < rounding_floor(answer, "N")
+        == pytest.approx(5e-6)
+    )
     assert rounding_floor(answer, "m") == 1e-15
 
 

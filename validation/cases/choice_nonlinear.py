@@ -58,7 +58,7 @@ def judge_ride(bent_ride: NonlinearRide) -> ChoiceCheckedByRuns:
     if full_scene is None or rest is None:
         return ChoiceCheckedByRuns("ride", engine, bent_ride, choice, np.full(len(bent_ride.quantities), np.inf))
     again = [
-        _significant_change(full_scene.quantity(name).cases[0], rest.quantity(name).cases[0])
+        _significant_change(full_scene.quantity(name).case_values[0], rest.quantity(name).case_values[0])
         for name in bent_ride.quantities
     ]
     return ChoiceCheckedByRuns("ride", engine, bent_ride, choice, np.array(again))
