@@ -129,7 +129,7 @@ def test_a_search_ends_where_its_runs_are_spent_and_says_so(monkeypatch):
         return 100.0 + (0.1 if "e00" in left_out else 0.0) + 50.0 * len(left_out - {"e00"})
 
     found, shares = chooser(monkeypatch, quantity, names), []
-    found.progress = shares.append
+    found.report_progress = shares.append
     choice = found.choose()
     own = found.whole.variants.quantities_of_run().counts["calls"]
     assert choice.ended_early and choice.left_out == ("e00",) and choice.within_tolerance
@@ -219,7 +219,11 @@ def test_what_only_rounds_does_not_move():
     answer = RunQuantities(
         {"a": Quantity("N", (np.array([5e4, 5e4 + 1e-7]),)), "b": Quantity("m", (np.zeros(2),))}, {}, 0.0
     )
-    assert reference_sizes_of_cases(answer.quantity("a").cases)[0] < rounding_floor(answer, "N") == pytest.approx(5e-6)
+    assert (
+        reference_sizes_of_cases(answer.quantity("a").case_values)[0]
+        < rounding_floor(answer, "N")
+        == pytest.approx(5e-6)
+    )
     assert rounding_floor(answer, "m") == 1e-15
 
 

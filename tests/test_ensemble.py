@@ -165,7 +165,7 @@ import sys, time
 from pathlib import Path
 sys.path.insert(0, {tests!r})
 from test_ensemble import BLOCK, PATHS, PathBlocks, job, run_paths
-run_paths(job(Path({forces!r})), PATHS, Path({blocks!r}), blocks=PathBlocks(BLOCK), report_progress=lambda state:
+run_paths(job(Path({forces!r})), PATHS, Path({blocks!r}), path_blocks=PathBlocks(BLOCK), report_progress=lambda state:
 time.sleep(0.3))
 """
 

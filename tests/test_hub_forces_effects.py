@@ -88,7 +88,7 @@ def test_quantities_are_those_of_the_run_that_the_scene_holds():
     """A price and a choice see a stabiliser by what it changes; angles that nothing reads change nothing."""
     free, held = scene(), scene(stabilise={"method": "kalman"})
     paths = [
-        computed_quantities(own, "mujoco").quantities["roll"].cases[0]
+        computed_quantities(own, "mujoco").quantities["roll"].case_values[0]
         for own in (free, scene_without(free, "angle_noise"), held, scene_without(held, "angle_noise"))
     ]
     assert np.array_equal(paths[0], paths[1])

@@ -166,7 +166,7 @@ def test_bands_hold_what_was_measured(scene: SingleTrackScene) -> None:
     fresh = identification_problem_of(begun(scene), measured(scene, 7), KEYS, low_pass_edge=5.0)
     answer = error_bands(fresh, known, errors)
     assert np.all(answer.share_inside() > 0.9) and np.all(answer.share_inside() <= 0.995)
-    assert np.all(answer.width() < 2.5)
+    assert np.all(answer.relative_width() < 2.5)
     assert np.all(replace(answer, half_width=0.25 * answer.half_width).share_inside() < 0.7)
 
 

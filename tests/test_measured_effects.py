@@ -52,8 +52,8 @@ def test_a_price_and_a_choice_see_what_a_fault_changes_in_the_answers():
         measured.computed_quantities(own, "mujoco")
         for own in (noisy, scene_without(noisy, "sensor_noise"), with_effects(noisy, "offsets"))
     ]
-    seats = [one.quantities["left seat F"].cases[0] for one in told]
-    assert len(seats[0]) == 181 and told[0].counts["steps"] == measured.steps(noisy) == 180
+    seats = [one.quantities["left seat F"].case_values[0] for one in told]
+    assert len(seats[0]) == 181 and told[0].counts["steps"] == measured.step_count(noisy) == 180
     assert len({seat.tobytes() for seat in seats}) == 3
 
 
@@ -80,9 +80,9 @@ def test_a_recording_is_run_for_a_part_and_in_longer_steps(tmp_path, monkeypatch
     for own, steps in ((short(), 180), (of_files, 200)):
         whole = Variants(own, "mujoco")
         part = whole.window(20)
-        assert measured.steps(own) == steps and measured.steps(part.scene) == 120  # at least 100 samples
+        assert measured.step_count(own) == steps and measured.step_count(part.scene) == 120  # at least 100 samples
         assert whole.quantities_of_run(step_factor=2).counts["steps"] == steps // 2
-        paths = [one.quantities_of_run().quantities["body z"].cases[0] for one in (whole, part)]
+        paths = [one.quantities_of_run().quantities["body z"].case_values[0] for one in (whole, part)]
         assert len(paths[1]) == 121 and abs(paths[0][:115] - paths[1][:115]).max() < 1e-12 * abs(paths[0]).max()
 
 

@@ -94,7 +94,7 @@ def test_whole_numbers_of_an_mdf_file_become_values_by_its_line(tmp_path):
     """Counts k with the conversion 0.25 k - 3.0 kN."""
     asammdf = pytest.importorskip("asammdf")
     times, counts, file = 0.5 + PERIOD * np.arange(50), np.arange(50, dtype=np.uint16), asammdf.MDF(version="4.10")
-    file.append([asammdf.MeasuredSignal(counts, times, name="fz", unit="kN", conversion={"a": 0.25, "b": -3.0})])
+    file.append([asammdf.Signal(counts, times, name="fz", unit="kN", conversion={"a": 0.25, "b": -3.0})])
     file.save(tmp_path / "a.mf4")
     source = open_source(tmp_path / "a.mf4")
     (channel,), (block,) = source.channels, source.blocks(["fz"])

@@ -248,7 +248,7 @@ def planar(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 def test_a_recording_on_the_pitch_plane_gives_its_pitch_back(planar: Recording, tmp_path: Path) -> None:
     found = plane_run(PlaneRunSettings(planar, "itwm_drift", hold=AttitudeHold(force=10.0)), tmp_path / "run")
     pitch = found.outcome.columns.read("chassis pitch")
-    assert np.abs(pitch - planar.samples(planar.find("angle")[0])).max() < 1e-4
+    assert np.abs(pitch - planar.samples(planar.find_signals("angle")[0])).max() < 1e-4
     assert (
         found.verdict.word == "accepted" and found.outcome.normalised_innovation < 1.0
     )  # nothing but the stated noise is missing

@@ -131,7 +131,7 @@ def test_a_quantity_that_one_sample_makes_up_is_refused():
     variants = Variants(quarter_car(), "reference")
     answer = variants.quantities_of_run()
     name = "body front"
-    lone = replace(answer.quantities[name], cases=(np.array([1.0, *[0.01] * 15]),))
+    lone = replace(answer.quantities[name], case_values=(np.array([1.0, *[0.01] * 15]),))
     variants._quantities_of_variant[frozenset(), 1] = replace(answer, quantities={**answer.quantities, name: lone})
     with pytest.raises(InputError, match="made up to 87 % by one sample of 16"):
         EffectScreen(variants, [name])

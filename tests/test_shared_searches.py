@@ -153,7 +153,7 @@ def test_a_choice_is_the_same_by_workers_and_runs_ahead_that_nobody_asks_for_do_
     here = Variants(half_car(), "reference").quantities_of_run(["gyro"])
     assert first.counts == here.counts and first.quantities.keys() == here.quantities.keys()
     for name, quantity in here.quantities.items():
-        assert all(map(np.array_equal, quantity.cases, first.quantities[name].cases)), name
+        assert all(map(np.array_equal, quantity.case_values, first.quantities[name].case_values)), name
 
 
 STEPS = tuple(0.1 / 2**k for k in range(10))

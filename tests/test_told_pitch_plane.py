@@ -11,7 +11,7 @@ from models.core.result import Channel, result
 from models.core.systems import load
 from models.core.time_series import write_time_series
 from models.engines.assembly import Settings
-from models.sensors.motion_assumptions import AccelerometerRecord, assumptions
+from models.sensors.motion_assumptions import AccelerometerRecord, assumptions_of_motion
 from models.sensors.rigid_body_motion import RecoveredMotion, RigidFitQuality
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import build
@@ -155,12 +155,12 @@ def test_a_motion_that_no_angles_and_no_samples_tell(files):
     moved = RecoveredMotion(rates, rates, turned, rates, rates, rates)
     readings = np.tile([9.81 * np.sin(0.3), 0.0, -9.81 * np.cos(0.3)], (5, 4, 1))
     loose = AccelerometerRecord(RigidFitQuality(np.full(5, 1.0), 0.4, 0.0, 6), readings, 0.01, True)
-    names = [a.name for a in assumptions(loose, moved) if not within(a)]
+    names = [a.name for a in assumptions_of_motion(loose, moved) if not within(a)]
     assert names == ["away from gimbal lock", "fine samples", "rigid body", "level start"]
     level = np.tile([0.0, 0.0, -9.81], (5, 4, 1))
     firm = AccelerometerRecord(RigidFitQuality(np.full(5, 0.01), 0.01, 0.0, 6), level, 1e-3, True)
     still = RecoveredMotion(0 * rates, 0.1 * rates, np.tile([1.0, 0.0, 0.0, 0.0], (5, 1)), rates, rates, rates)
-    assert all(within(a) for a in assumptions(firm, still))
+    assert all(within(a) for a in assumptions_of_motion(firm, still))
 
 
 def within(assumption):

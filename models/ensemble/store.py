@@ -105,12 +105,12 @@ def exclusive_folder(store_folder: Path) -> Iterator[None]:
         yield
 
 
-def _read_job_file(note_path: Path) -> dict[str, Any]:
+def _read_job_file(job_file_path: Path) -> dict[str, Any]:
     """Content of a folder's job file; raises InputError if it cannot be read."""
     try:
-        note = json.loads(note_path.read_text())
+        note = json.loads(job_file_path.read_text())
     except (OSError, ValueError) as error:
-        raise InputError(note_path, "", None, f"is not the note of an ensemble: {error}") from None
+        raise InputError(job_file_path, "", None, f"is not the note of an ensemble: {error}") from None
     return note if isinstance(note, dict) else {}
 
 

@@ -64,7 +64,7 @@ def judge_choice_for_ride(nonlinear_ride: NonlinearRide) -> ChoiceCheckedByRuns:
             "ride", engine, nonlinear_ride, choice, np.full(len(nonlinear_ride.quantities), np.inf)
         )
     again = [
-        _significant_change(full_scene.quantity(name).cases[0], rest.quantity(name).cases[0])
+        _significant_change(full_scene.quantity(name).case_values[0], rest.quantity(name).case_values[0])
         for name in nonlinear_ride.quantities
     ]
     return ChoiceCheckedByRuns("ride", engine, nonlinear_ride, choice, np.array(again))

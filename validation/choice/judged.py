@@ -117,7 +117,8 @@ def choice_checked_by_runs(question: ChoiceQuestion, system_name: str, engine: s
         runs.changed_scene(frozenset(choice.left_out), choice.step_factor), engine
     )
     confirmed_changes = [
-        largest_change(full_run.quantity(name).cases, reduced_run.quantity(name).cases) for name in question.quantities
+        largest_change(full_run.quantity(name).case_values, reduced_run.quantity(name).case_values)
+        for name in question.quantities
     ]
     return ChoiceCheckedByRuns(system_name, engine, question, choice, np.array(confirmed_changes))
 

@@ -26,17 +26,22 @@ SCALAR_OF_TIME_HISTORY = {"rms": lambda path: np.sqrt(np.mean(path**2)), "max": 
 class Quantity:
     """A quantity's unit, and its values in every case of the run (procedure, manoeuvre, speed, creepage).
 
-    sampled : each case holds mean squares (m,) of independent samples; the quantity is the root of their mean.
+    is_mean_of_samples : each case holds mean squares (m,) of independent samples; the quantity is the root of their
+    mean.
     """
 
     unit: str
-    cases: CaseValues
-    sampled: bool = False
+    case_values: CaseValues
+    is_mean_of_samples: bool = False
 
     @property
     def reference_sizes(self) -> np.ndarray:
         """Reference sizes of the quantity, one for each case; changes are divided by them."""
-        return np.sqrt([case.mean() for case in self.cases]) if self.sampled else reference_sizes_of_cases(self.cases)
+        return (
+            np.sqrt([case.mean() for case in self.case_values])
+            if self.is_mean_of_samples
+            else reference_sizes_of_cases(self.case_values)
+        )
 
 
 @dataclass(frozen=True)
@@ -56,8 +61,10 @@ class RunQuantities:
             return self.quantities[quantity_name]
         word, _, base_name = quantity_name.partition(" ")
         path = self.quantities.get(base_name)
-        if word in SCALAR_OF_TIME_HISTORY and path is not None and not path.sampled:
-            return Quantity(path.unit, tuple(np.array([SCALAR_OF_TIME_HISTORY[word](case)]) for case in path.cases))
+        if word in SCALAR_OF_TIME_HISTORY and path is not None and not path.is_mean_of_samples:
+            return Quantity(
+                path.unit, tuple(np.array([SCALAR_OF_TIME_HISTORY[word](case)]) for case in path.case_values)
+            )
         allowed = (
             "no such quantity in this scene, whose own are, each also with 'rms' or 'max' before it if it is a path"
         )
@@ -77,10 +84,10 @@ def reference_sizes_of_cases(case_values: Sequence[np.ndarray]) -> np.ndarray:
 def rounding_floor(run_quantities: RunQuantities, unit: str) -> float:
     """Size below which changes of quantities with this unit are only rounding."""
     sizes = [
-        np.sqrt(case.max()) if quantity.sampled else abs(case).max(initial=0.0)
+        np.sqrt(case.max()) if quantity.is_mean_of_samples else abs(case).max(initial=0.0)
         for quantity in run_quantities.quantities.values()
         if quantity.unit == unit
-        for case in quantity.cases
+        for case in quantity.case_values
     ]
     return max(ABSOLUTE_ROUNDING, ROUNDING_SHARE * float(max(sizes, default=0.0)))
 

@@ -44,9 +44,9 @@ class EffectScreen:
         if full is None:  # tells why
             full = variants.system.computed_quantities(variants.scene, variants.engine)
         quantities_by_name = {name: full.quantity(name, variants.scene.file) for name in quantities}
-        self.full = {name: quantity.cases for name, quantity in quantities_by_name.items()}
+        self.full = {name: quantity.case_values for name, quantity in quantities_by_name.items()}
         self.sizes = {name: quantity.reference_sizes for name, quantity in quantities_by_name.items()}
-        self.sampled = {name for name, quantity in quantities_by_name.items() if quantity.sampled}
+        self.sampled = {name for name, quantity in quantities_by_name.items() if quantity.is_mean_of_samples}
         for name, size in self.sizes.items():
             if not (np.isfinite(size).all() and (size > rounding_floor(full, quantities_by_name[name].unit)).any()):
                 self._refuse(name, "does not move in this scene, so that there is nothing to hold it to")
@@ -68,7 +68,7 @@ class EffectScreen:
             return None
         try:
             return {
-                name: difference_of_runs(run.quantity(name).cases, other_run.quantity(name).cases)
+                name: difference_of_runs(run.quantity(name).case_values, other_run.quantity(name).case_values)
                 for name in self.quantities
             }
         except InputError as error:

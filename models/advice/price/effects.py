@@ -200,12 +200,12 @@ def _quantity_changes(scene_quantities: RunQuantities, changed_quantities: RunQu
     for name, quantity in scene_quantities.quantities.items():
         if name in changed_quantities.quantities:
             try:
-                change = difference_of_runs(changed_quantities.quantities[name].cases, quantity.cases)
+                change = difference_of_runs(changed_quantities.quantities[name].case_values, quantity.case_values)
             except (InputError, ValueError):  # of other lengths, or of another number of cases
                 continue
             size = quantity.reference_sizes
-            if quantity.sampled:
-                share, chance = sampled_change_and_error(change, quantity.cases)
+            if quantity.is_mean_of_samples:
+                share, chance = sampled_change_and_error(change, quantity.case_values)
                 changed.append(QuantityChange(name, quantity.unit, share * float(size.max()), share, chance))
                 continue
             largest_difference = max(float(np.sqrt(np.mean(difference**2))) for difference in change)

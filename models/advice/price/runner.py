@@ -232,16 +232,16 @@ class WorkPrecisionPoints:
         return LossByDefault(factor, low, high, usual.origin)
 
     def _bootstrapped_seconds(
-        self, bracketing: list[WorkPrecisionPoint], target_error: float, round_count: int
+        self, bracket: list[WorkPrecisionPoint], target_error: float, round_count: int
     ) -> np.ndarray:
         """Seconds that a curve needs to meet a target error, interpolated between its bracketing points: one value per
         bootstrap sample of the timing rounds.
         """
-        timed_rounds = [np.array(p.seconds)[:: len(p.seconds) // round_count][:round_count] for p in bracketing]
+        timed_rounds = [np.array(p.seconds)[:: len(p.seconds) // round_count][:round_count] for p in bracket]
         medians = np.array(
             [np.median(seconds[resamples(round_count, BOOTSTRAP_DRAWS)], axis=1) for seconds in timed_rounds]
         )
-        cheapest_reaches = [self._cost_at_tolerance(bracketing, target_error, costs) for costs in medians.T]
+        cheapest_reaches = [self._cost_at_tolerance(bracket, target_error, costs) for costs in medians.T]
         return np.array([cheapest.cost for cheapest in cheapest_reaches if cheapest is not None])
 
     def points_to_time(self) -> list[WorkPrecisionPoint]:

@@ -10,7 +10,7 @@ from models.measured.ratios import cause_and_sentence
 from models.measured.signal import MeasuredSignal
 
 CHECK_NAME = "turning"
-COMPARED_BAND = 0.5, 12.0
+COMPARED_FREQUENCY_BAND = 0.5, 12.0
 """Frequency band (Hz) in which angles and rates are compared."""
 LEAST_COHERENCE = 0.8
 """Least squared coherence of spectral lines that are used; below it, noise dominates."""
@@ -53,7 +53,9 @@ def _pair_finding(
         (rate_signal.name, angle_signal.name),
     )
     pair_spectra = cross_spectra(
-        recording, (angle_signal, rate_signal), (COMPARED_BAND[0], min(COMPARED_BAND[1], 0.4 / recording.period))
+        recording,
+        (angle_signal, rate_signal),
+        (COMPARED_FREQUENCY_BAND[0], min(COMPARED_FREQUENCY_BAND[1], 0.4 / recording.period)),
     )
     squared = np.zeros(0)
     if pair_spectra is not None:

@@ -39,13 +39,13 @@ def computed_quantities(scene: MeasuredScene, engine: str, with_error_estimate: 
 
 def step_count(scene: MeasuredScene) -> int:
     """Number of steps of a run."""
-    return round(_period_and_duration(scene)[1] / _step(scene))
+    return round(_period_and_duration(scene)[1] / _time_step(scene))
 
 
 divisible_step_count = step_count
 
 
-def _step(scene: MeasuredScene) -> float:
+def _time_step(scene: MeasuredScene) -> float:
     """Step of the run (s): the scene's, else the period of the recording."""
     return scene.run.step or _period_and_duration(scene)[0]
 
@@ -67,8 +67,8 @@ def shorten_run(scene_table: dict[str, Any], scene: MeasuredScene, step_limit: i
     virtual measurement is shortened with it.
     """
     period, full_duration = _period_and_duration(scene)
-    least_steps = SHORTEST_PART_STEPS * math.ceil(FEWEST_SAMPLES * period / (_step(scene) * SHORTEST_PART_STEPS))
-    duration = min(max(step_limit, least_steps) * _step(scene), full_duration)
+    least_steps = SHORTEST_PART_STEPS * math.ceil(FEWEST_SAMPLES * period / (_time_step(scene) * SHORTEST_PART_STEPS))
+    duration = min(max(step_limit, least_steps) * _time_step(scene), full_duration)
     if scene.virtual is None:
         scene_table.setdefault("clock", {})["duration"] = duration
     else:
@@ -78,4 +78,4 @@ def shorten_run(scene_table: dict[str, Any], scene: MeasuredScene, step_limit: i
 
 def lengthen_steps(scene_table: dict[str, Any], scene: MeasuredScene, step_factor: int) -> None:
     """Edit ``scene_table`` to multiply the step by ``step_factor``."""
-    scene_table.setdefault("run", {})["step"] = step_factor * _step(scene)
+    scene_table.setdefault("run", {})["step"] = step_factor * _time_step(scene)
