@@ -100,7 +100,11 @@ def save_choices(
             chosen_scene, () if linear else (engine_for_choice(chosen_scene, engines_asked),)
         )
         report_share = partial(
-            _pass_progress, report_progress, f"{chosen_scene.title}, of at most {RUN_BUDGET} runs", i, len(scenes)
+            _report_scene_progress,
+            report_progress,
+            f"{chosen_scene.title}, of at most {RUN_BUDGET} runs",
+            i,
+            len(scenes),
         )
         choices.append(
             _linear_ride_choice(chosen_scene) if linear else choice_of_scene(chosen_scene, engines_asked, report_share)
@@ -133,12 +137,12 @@ def _results_by_name(scene_choices: list[SceneEffectChoice]) -> dict[str, Result
     }
 
 
-def _pass_progress(
-    report_progress: ReportProgress, scene_title: str, completed_scenes: int, scene_count: int, share: float
+def _report_scene_progress(
+    report_progress: ReportProgress, scene_title: str, completed_scenes: int, scene_count: int, finished_share: float
 ) -> None:
-    """Report progress over several scenes: ``completed_scenes`` scenes are done, and ``share`` of the search of the
-    current scene."""
-    report_progress(scene_title, (completed_scenes + share) / scene_count)
+    """Report progress over several scenes: ``completed_scenes`` scenes are done, and ``finished_share`` of the search
+    of the current scene."""
+    report_progress(scene_title, (completed_scenes + finished_share) / scene_count)
 
 
 def has_closed_form(scene: Any) -> bool:
@@ -462,6 +466,6 @@ def _plot_activity(axis: Any, scene_choice: SceneEffectChoice) -> None:
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("choice")
+    run_study_as_script("choice")

@@ -71,7 +71,7 @@ def _print_version(is_requested: bool) -> None:
 
 
 @app.callback()
-def common(
+def handle_version_option(
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end.")
     ] = False,
@@ -419,7 +419,7 @@ def validate(
     sys.exit(1 if failed else 0)
 
 
-def study(scene: str) -> None:
+def run_study_as_script(scene: str) -> None:
     """Run a study's scene as ``python studies/NAME.py`` does: as ``twinrig run``, with the same options."""
     sys.argv = [sys.argv[0], "run", scene, *sys.argv[1:]]
     main()

@@ -428,6 +428,6 @@ def _plot_errors(axis: Any, times: np.ndarray, errors_of_methods: dict[str, np.n
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("motion")
+    run_study_as_script("motion")

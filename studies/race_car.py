@@ -172,8 +172,8 @@ def identify_simpler_vehicle(
     parameters = [text for text in study_options.identified_keys() if any(word in text for word in kept_words)]
     simpler_search = ParameterSearch(parameters, list(AIMED_ERRORS), study_options.low_pass, blocks=2)
 
-    def tell(text: str, share: float) -> None:
-        report_progress(f"{vehicle_name}: {text}", 0.95)
+    def tell(task_text: str, finished_share: float) -> None:
+        report_progress(f"{vehicle_name}: {task_text}", 0.95)
 
     return identified_vehicle(
         _scene_with_values(identification_scene, holds),
@@ -266,6 +266,6 @@ def _residual_lines(correlations_by_channel: dict[str, dict[str, float]]) -> lis
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("race_car")
+    run_study_as_script("race_car")

@@ -194,6 +194,6 @@ def _table_lines(
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("ride_detail")
+    run_study_as_script("ride_detail")

@@ -78,11 +78,11 @@ def error_texts(change_forces: ForceChange) -> list[str]:
     return [finding.text for finding in findings if finding.weight == "doubt"]
 
 
-def _missed_doubts(change_forces: ForceChange, is_doubted: bool, _: str, work_folder: Path) -> float:
+def _missed_doubt_error(change_forces: ForceChange, is_doubted: bool, _: str, work_folder: Path) -> float:
     return abs(len(error_texts(change_forces)) - is_doubted)
 
 
-def _unqueried_vehicle(parameter_changes: dict[str, float], _: str, work_folder: Path) -> float:
+def _unqueried_vehicle_error(parameter_changes: dict[str, float], _: str, work_folder: Path) -> float:
     return float(not plausible_plane(TWIN.model_copy(update=parameter_changes)))
 
 
@@ -108,22 +108,24 @@ def _refusal_case(
 CASES = (
     *(
         _refusal_case(
-            name, partial(_missed_doubts, change, True), "refused", "refused before the run, with what is wrong"
+            name, partial(_missed_doubt_error, change, True), "refused", "refused before the run, with what is wrong"
         )
         for name, change in REFUSED.items()
     ),
     *(
         _refusal_case(
             name,
-            partial(_missed_doubts, change, True),
+            partial(_missed_doubt_error, change, True),
             "right",
             "one doubt before the run, with the fall or turn to come",
         )
         for name, change in DOUBTED.items()
     ),
-    _refusal_case("true wheel forces", partial(_missed_doubts, lambda f: f, False), "right", "nothing is said"),
+    _refusal_case("true wheel forces", partial(_missed_doubt_error, lambda f: f, False), "right", "nothing is said"),
     *(
-        _refusal_case(name, partial(_unqueried_vehicle, change), "right", "queried, with the value and what is usual")
+        _refusal_case(
+            name, partial(_unqueried_vehicle_error, change), "right", "queried, with the value and what is usual"
+        )
         for name, change in QUERIED.items()
     ),
 )

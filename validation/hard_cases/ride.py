@@ -202,7 +202,7 @@ def slow_weighting_error(engine_name: str, work_folder: Path) -> float:
     return largest_relative_error(variance, wanted)
 
 
-def standstill_error(engine_name: str, work_folder: Path) -> float:
+def drive_with_standstill_error(engine_name: str, work_folder: Path) -> float:
     """Case: a drive that starts and ends with a stop. Error: largest relative change of the road height's variance
     under each wheel."""
     vehicle = linear_equations(load_vehicle("half_car"), engine_name)
@@ -224,7 +224,7 @@ def invalid_speeds_error(engine_name: str, work_folder: Path) -> float:
     raise refusal
 
 
-def wrong_entry_case(spoil_table: VehicleTableChange, expected_place: str) -> Callable[..., float]:
+def wrong_entry_case(spoil_table: VehicleTableChange, expected_error_place: str) -> Callable[..., float]:
     """Case: the half car's file with a wrong entry must be refused with the entry's name."""
 
     def error(engine_name: str, work_folder: Path) -> float:
@@ -233,7 +233,7 @@ def wrong_entry_case(spoil_table: VehicleTableChange, expected_place: str) -> Ca
         try:
             vehicle = build_vehicle(table, "half_car.toml")
         except InputError as refusal:
-            if expected_place not in refusal.place:
+            if expected_error_place not in refusal.place:
                 return np.inf
             raise
         return float(np.isfinite(_deviations_of_ride(linear_equations(vehicle, engine_name))).all()) + 1.0
@@ -385,7 +385,7 @@ CASES = (
         "",
         1e-10,
         "rounding",
-        standstill_error,
+        drive_with_standstill_error,
     ),
     HardCase(
         "damper of the wrong sign",
