@@ -184,7 +184,7 @@ def run_scene(
         job = sweep_points(sweep, scene, changes or (), engine, not no_error)
         crew = crew_of(job.check(), workers, cluster)
         folder = results_folder_of(f"{Path(scene).stem}-sweep", RECORDS_FOLDER, "", out, resume)
-        work = partial(run_points, replace(job, output_folder=folder), crew=crew)
+        work = partial(run_points, replace(job, output_folder=folder), worker_crew=crew)
         return run_and_print_summary(telling(work), folder, as_json, is_strict=strict)
     loaded = load_scene(scene, changes)
     loaded = loaded.model_copy(
