@@ -453,6 +453,7 @@ def _effect_label(scene_choice: SceneEffectChoice, effect: SingleEffect) -> str:
 
 
 def _plot_activity(axis: Any, scene_choice: SceneEffectChoice) -> None:
+    """Draw a bar chart of each element's share of the energy activity."""
     from models.drawing.figures import BLUE
 
     finite = {name: value for name, value in scene_choice.activity_of_element.items() if np.isfinite(value)}

@@ -165,6 +165,7 @@ def _measured_readings(scene: Scene, study_options: Options, parameters: Paramet
 
 
 def _readings_of_file(source_name: str, readings_path: Path, parameters: Parameters) -> ReadingsSource:
+    """Accelerometer readings of a file, named for the results."""
     values, period = read_time_series(
         readings_path, dict.fromkeys(chain(*channels_of_sensors(parameters)), ACCELERATIONS)
     )

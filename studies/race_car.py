@@ -156,6 +156,7 @@ def _scene_with_car(scene: SingleTrackScene, drive_path: Path, car_tables: dict[
 
 
 def _scene_of_section(scene: SingleTrackScene, section_ends: list[float]) -> SingleTrackScene:
+    """The scene with the drive cut to a section (s), without options."""
     return scene.model_copy(update={"drive": scene.drive.model_copy(update={"stretch": section_ends}), "options": {}})
 
 
@@ -184,6 +185,7 @@ def identify_simpler_vehicle(
 
 
 def _scene_with_values(scene: SingleTrackScene, new_values: dict[str, float]) -> SingleTrackScene:
+    """The scene with a sharpness of 2 at both axles, and other values of some keys."""
     from models.core.scene_file import set_key
 
     table = scene.table()

@@ -219,6 +219,7 @@ def _quantities_of_table(table_path: Path) -> Iterator[tuple[str, ResultQuantity
 
 
 def _numeric_cells(column_cells: tuple[str, ...]) -> np.ndarray | None:
+    """Numbers of a column's cells, NaN for empty ones; None if a cell is no number or all are empty."""
     try:
         values = np.array([float(cell) if cell.strip() else np.nan for cell in column_cells])
     except ValueError:

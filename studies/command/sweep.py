@@ -116,10 +116,12 @@ class SweepJob:
 
 
 def _json_array(point_records: Iterable[PointRecord]) -> Arrays:
+    """Records as an array of JSON texts."""
     return {"record": np.array(list(map(json.dumps, point_records)))}
 
 
 def _failed_record(failure_reason: object) -> PointRecord:
+    """Record of a point that has no results, with the reason."""
     return {"numbers": {}, "failed": {"": str(failure_reason)}, "results": {}}
 
 

@@ -61,6 +61,7 @@ def _settled_state() -> np.ndarray:
 
 
 def _settled_assembly(base_assembly: Assembly) -> Assembly:
+    """The vehicle with the settled state as its initial state."""
     base_assembly.initial[:] = _settled_state()
     return base_assembly
 

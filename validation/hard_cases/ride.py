@@ -138,6 +138,8 @@ def toppling_car_error(engine_name: str, work_folder: Path) -> float:
 
 
 def _error_unless_refused(vehicle: LinearVehicle) -> float:
+    """Raises the refusal of an unstable vehicle if both routes to the variances state the right growth rate; else
+    infinite."""
     road, growing = paper_road(vehicle.wheels), float(eigenvalues(vehicle).real.max())
     for route in (
         lambda: stationary_covariance(vehicle_with_road(vehicle, road, SPEED)),
@@ -171,6 +173,7 @@ def no_delay_error(engine_name: str, work_folder: Path) -> float:
 
 
 def _deviations_of_ride(vehicle: LinearVehicle, speed: float = SPEED, axle_correlation: str = "delayed") -> np.ndarray:
+    """Standard deviations of the outputs on the paper's road at a speed (m/s)."""
     return stationary_covariance(
         vehicle_with_road(vehicle, paper_road(vehicle.wheels, "modelled", axle_correlation), speed)
     ).deviation
@@ -242,6 +245,7 @@ def wrong_entry_case(spoil_table: VehicleTableChange, expected_error_place: str)
 
 
 def _add_unconnected_body(vehicle_table: dict[str, Any]) -> None:
+    """Add a body without any spring to the table of a vehicle."""
     vehicle_table["bodies"].append({"name": "box", "mass": 5.0, "position": [0.0, 0.0, 1.0], "freedoms": ["z"]})
 
 
