@@ -63,6 +63,6 @@ def _frames_with_progress(
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("animation")
+    run_study_as_script("animation")

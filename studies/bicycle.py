@@ -106,6 +106,6 @@ def eigenvalue_and_motion_figure(
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("bicycle")
+    run_study_as_script("bicycle")

@@ -38,7 +38,7 @@ class BicycleObservations:
     not used in the choice; if all were used, each speed is predicted by a choice on all others."""
 
     observations: list[Observation]
-    choice: SubsetChoice
+    parameter_choice: SubsetChoice
     predictions: dict[float, tuple[np.ndarray, np.ndarray]]
 
 
@@ -92,7 +92,7 @@ def observation_lines(
             for i, sign in ((0, -1.0), (1, 1.0))
         ]
         lines.append(f"{observation.speed:4.2f} m/s {len(observation.weave):5d}   {'    '.join(cells)}")
-    choice, best = bicycle_observations.choice, bicycle_observations.choice.best_subset
+    choice, best = bicycle_observations.parameter_choice, bicycle_observations.parameter_choice.best_subset
     lines += ["", f"best of {len(choice.subset_fits)} subsets (inflation of chi^2: {choice.variance_inflation:.2f}):"]
     errors = np.sqrt(choice.variance_inflation * np.diag(best.covariance))
     for name, value, error in zip(best.names, best.values, errors, strict=True):

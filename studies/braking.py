@@ -146,6 +146,6 @@ def figures_of_merit_lines(
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("braking")
+    run_study_as_script("braking")

@@ -163,6 +163,6 @@ def calibration_lines(
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("braking_calibration")
+    run_study_as_script("braking_calibration")

@@ -205,6 +205,6 @@ def _figure(scene: BrakingScene, stop_rows: list[dict[str, Any]], figure_path: P
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("braking_controllers")
+    run_study_as_script("braking_controllers")

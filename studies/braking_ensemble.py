@@ -77,10 +77,10 @@ def run(
                 table, scene.file, scene.folder, options.procedure, options.speed_spread, options.seed + i
             )
 
-            def tell(finished: Done, ensemble_number: int = i) -> None:
+            def tell(ensemble_progress: Done, ensemble_number: int = i) -> None:
                 report_progress(
-                    f"{options.names[ensemble_number]}: {finished}",
-                    (ensemble_number + finished.done / finished.paths) / len(tables),
+                    f"{options.names[ensemble_number]}: {ensemble_progress}",
+                    (ensemble_number + ensemble_progress.done / ensemble_progress.paths) / len(tables),
                 )
 
             store = output_folder / BLOCKS_FOLDER / options.names[i]
@@ -179,6 +179,6 @@ def _figure(
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("braking_ensemble")
+    run_study_as_script("braking_ensemble")

@@ -100,7 +100,7 @@ def save_choices(
             chosen_scene, () if linear else (engine_for_choice(chosen_scene, engines_asked),)
         )
         report_share = partial(
-            _pass_progress,
+            _report_scene_progress,
             report_progress,
             f"{chosen_scene.title}, of at most {SEARCH_BUDGET_IN_RUNS} runs",
             i,
@@ -137,12 +137,12 @@ def _results_by_name(scene_choices: list[SceneEffectChoice]) -> dict[str, Result
     }
 
 
-def _pass_progress(
-    report_progress: ReportProgress, scene_title: str, completed_scenes: int, scene_count: int, share: float
+def _report_scene_progress(
+    report_progress: ReportProgress, scene_title: str, completed_scenes: int, scene_count: int, finished_share: float
 ) -> None:
-    """Report progress over several scenes: ``completed_scenes`` scenes are done, and ``share`` of the search of the
-    current scene."""
-    report_progress(scene_title, (completed_scenes + share) / scene_count)
+    """Report progress over several scenes: ``completed_scenes`` scenes are done, and ``finished_share`` of the search
+    of the current scene."""
+    report_progress(scene_title, (completed_scenes + finished_share) / scene_count)
 
 
 def has_closed_form(scene: Any) -> bool:
@@ -459,6 +459,7 @@ def _effect_label(scene_choice: SceneEffectChoice, effect: SingleEffect) -> str:
 
 
 def _plot_activity(axis: Any, scene_choice: SceneEffectChoice) -> None:
+    """Draw a bar chart of each element's share of the energy activity."""
     from models.drawing.figures import BLUE
 
     finite = {name: value for name, value in scene_choice.activity_of_element.items() if np.isfinite(value)}
@@ -472,6 +473,6 @@ def _plot_activity(axis: Any, scene_choice: SceneEffectChoice) -> None:
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("choice")
+    run_study_as_script("choice")

@@ -71,7 +71,7 @@ def _print_version(is_requested: bool) -> None:
 
 
 @app.callback()
-def common(
+def handle_version_option(
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end.")
     ] = False,
@@ -184,7 +184,7 @@ def run_scene(
         job = sweep_points(sweep, scene, changes or (), engine, not no_error)
         crew = crew_of(job.check(), workers, cluster)
         folder = results_folder_of(f"{Path(scene).stem}-sweep", RECORDS_FOLDER, "", out, resume)
-        work = partial(run_points, replace(job, output_folder=folder), crew=crew)
+        work = partial(run_points, replace(job, output_folder=folder), worker_crew=crew)
         return run_and_print_summary(telling(work), folder, as_json, is_strict=strict)
     loaded = load_scene(scene, changes)
     loaded = loaded.model_copy(
@@ -419,7 +419,7 @@ def validate(
     sys.exit(1 if failed else 0)
 
 
-def study(scene: str) -> None:
+def run_study_as_script(scene: str) -> None:
     """Run a study's scene as ``python studies/NAME.py`` does: as ``twinrig run``, with the same options."""
     sys.argv = [sys.argv[0], "run", scene, *sys.argv[1:]]
     main()

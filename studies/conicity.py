@@ -39,6 +39,6 @@ def run(
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("conicity")
+    run_study_as_script("conicity")

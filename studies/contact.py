@@ -197,6 +197,6 @@ def _exact_theory_results(scene: ContactScene, contact_results: ContactResults) 
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("contact_ellipse")
+    run_study_as_script("contact_ellipse")

@@ -89,6 +89,6 @@ def _table_lines(theory_points: list[TheoryPoint], contact_count: int, reference
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("contact_price")
+    run_study_as_script("contact_price")

@@ -63,6 +63,6 @@ def summary_lines(
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("contact_table")
+    run_study_as_script("contact_table")

@@ -87,8 +87,8 @@ def run(scene: Scene, engines: tuple[str, ...], output_folder: Path, report_prog
     true = measured.states[np.rint(row_times / scene.run.step).astype(int)]
     statistics = PathStatistics(true, max(options.saved, options.engine_paths))
 
-    def tell(finished: Done) -> None:
-        report_progress(f"reference: {finished}", finished.done / finished.paths)
+    def tell(ensemble_progress: Done) -> None:
+        report_progress(f"reference: {ensemble_progress}", ensemble_progress.done / ensemble_progress.paths)
 
     crew, cut = Crew.of(scene), PathBlocks(options.block)
     with TemporaryDirectory() as name, crew.at_work(cut.count(options.paths)) as pool:
@@ -248,8 +248,8 @@ def summary_lines(
     return lines
 
 
-def _time_text(seconds: float) -> str:
-    return f"{seconds:.2f}" if np.isfinite(seconds) else "never"
+def _time_text(drift_off_time: float) -> str:
+    return f"{drift_off_time:.2f}" if np.isfinite(drift_off_time) else "never"
 
 
 def _figure(
@@ -292,6 +292,6 @@ def _figure(
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("ensemble")
+    run_study_as_script("ensemble")

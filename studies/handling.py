@@ -78,6 +78,6 @@ def _manoeuvre_line(manoeuvre_name: str, run_figures: dict[str, float]) -> str:
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("handling")
+    run_study_as_script("handling")

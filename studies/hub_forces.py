@@ -113,6 +113,6 @@ def _write_samples(table_path: Path, columns_and_units: list[tuple[str, str]], s
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("hub_forces")
+    run_study_as_script("hub_forces")

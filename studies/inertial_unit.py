@@ -289,6 +289,6 @@ def _damage_curve_figure(damage_curve: CubicSpline) -> Any:
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("inertial_unit")
+    run_study_as_script("inertial_unit")

@@ -125,6 +125,6 @@ def _cycle_lines(cycles_by_engine: dict[str, Orbit]) -> list[str]:
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("limit_cycle")
+    run_study_as_script("limit_cycle")

@@ -86,9 +86,15 @@ def run(
 
 
 def _report_progress(
-    report_progress: ReportProgress, scene: WheelRailScene, case_number: int, lateral_shift: float, share: float
+    report_progress: ReportProgress,
+    scene: WheelRailScene,
+    case_number: int,
+    lateral_shift: float,
+    finished_share: float,
 ) -> None:
-    report_progress(f"{[*scene.cases][case_number]} at {lateral_shift:g} mm", (case_number + share) / len(scene.cases))
+    report_progress(
+        f"{[*scene.cases][case_number]} at {lateral_shift:g} mm", (case_number + finished_share) / len(scene.cases)
+    )
 
 
 def _save_tables(case_name: str, case_result: Result, output_folder: Path) -> None:
@@ -177,6 +183,6 @@ def _patch_lines(position_row: dict[str, Any]) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("manchester")
+    run_study_as_script("manchester")

@@ -165,6 +165,7 @@ def _measured_readings(scene: Scene, study_options: Options, parameters: Paramet
 
 
 def _readings_of_file(source_name: str, readings_path: Path, parameters: Parameters) -> ReadingsSource:
+    """Accelerometer readings of a file, named for the results."""
     values, period = read_time_series(
         readings_path, dict.fromkeys(chain(*channels_of_sensors(parameters)), ACCELERATIONS)
     )
@@ -428,6 +429,6 @@ def _plot_errors(axis: Any, times: np.ndarray, errors_of_methods: dict[str, np.n
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("motion")
+    run_study_as_script("motion")

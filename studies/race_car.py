@@ -156,6 +156,7 @@ def _scene_with_car(scene: SingleTrackScene, drive_path: Path, car_tables: dict[
 
 
 def _scene_of_section(scene: SingleTrackScene, section_ends: list[float]) -> SingleTrackScene:
+    """The scene with the drive cut to a section (s), without options."""
     return scene.model_copy(update={"drive": scene.drive.model_copy(update={"stretch": section_ends}), "options": {}})
 
 
@@ -172,8 +173,8 @@ def identify_simpler_vehicle(
     parameters = [text for text in study_options.identified_keys() if any(word in text for word in kept_words)]
     simpler_search = ParameterSearch(parameters, list(AIMED_ERRORS), study_options.low_pass, blocks=2)
 
-    def tell(text: str, share: float) -> None:
-        report_progress(f"{vehicle_name}: {text}", 0.95)
+    def tell(task_text: str, finished_share: float) -> None:
+        report_progress(f"{vehicle_name}: {task_text}", 0.95)
 
     return identified_vehicle(
         _scene_with_values(identification_scene, holds),
@@ -184,6 +185,7 @@ def identify_simpler_vehicle(
 
 
 def _scene_with_values(scene: SingleTrackScene, new_values: dict[str, float]) -> SingleTrackScene:
+    """The scene with a sharpness of 2 at both axles, and other values of some keys."""
     from models.core.scene_file import set_key
 
     table = scene.table()
@@ -266,6 +268,6 @@ def _residual_lines(correlations_by_channel: dict[str, dict[str, float]]) -> lis
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("race_car")
+    run_study_as_script("race_car")

@@ -99,6 +99,6 @@ def _lines_of_findings(examined_recording: RecordingAnalysis) -> list[str]:
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("recording")
+    run_study_as_script("recording")

@@ -282,6 +282,6 @@ def _load_factor_lines(vehicle: SpatialVehicle, deviation_by_output: Mapping[str
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("ride")
+    run_study_as_script("ride")

@@ -318,6 +318,6 @@ def saved_work_lines(effect_choice: RideChoice, tolerance_text: str) -> list[str
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("ride_choice")
+    run_study_as_script("ride_choice")

@@ -110,6 +110,7 @@ def _study_options(scene: RideScene) -> Options:
 
 
 def _simpler_vehicles(scene: RideScene) -> list[SpatialVehicle]:
+    """The simpler vehicles that the options name, read from their files."""
     names = enumerate(_study_options(scene).simpler)
     return [load_vehicle(name, scene.folder, scene.file, f"options.simpler.{i}") for i, name in names]
 
@@ -194,6 +195,6 @@ def _table_lines(
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("ride_detail")
+    run_study_as_script("ride_detail")

@@ -106,6 +106,6 @@ def _table_lines(varying_speed: VaryingSpeed, quasi_stationary_deviations: np.nd
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("ride_drive")
+    run_study_as_script("ride_drive")

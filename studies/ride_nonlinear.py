@@ -215,6 +215,6 @@ def _engine_run_lines(
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("ride_nonlinear")
+    run_study_as_script("ride_nonlinear")

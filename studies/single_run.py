@@ -123,6 +123,6 @@ def _plot_differences(axis: Any, results_by_engine: dict[str, Result]) -> None:
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("study_road")
+    run_study_as_script("study_road")

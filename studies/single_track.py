@@ -87,6 +87,6 @@ def drive_figure(
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("single_track")
+    run_study_as_script("single_track")

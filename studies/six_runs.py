@@ -188,6 +188,6 @@ def _moment_figure(stabilised_run: Result) -> Any:
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("six_runs")
+    run_study_as_script("six_runs")

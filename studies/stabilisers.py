@@ -133,6 +133,6 @@ def _ratio_text(damage_ratio: float | None) -> str:
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("stabilisers")
+    run_study_as_script("stabilisers")

@@ -349,6 +349,6 @@ def _figure(
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("trust")
+    run_study_as_script("trust")

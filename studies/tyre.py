@@ -100,6 +100,6 @@ def save_tyre_friction(scene: BrakingScene, tyre_table: TyreTable, study_options
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("tyre")
+    run_study_as_script("tyre")

@@ -196,6 +196,6 @@ def _ending_text(wheelset_motion: Motion) -> str:
 
 
 if __name__ == "__main__":
-    from studies.command_line import study
+    from studies.command_line import run_study_as_script
 
-    study("wheelset")
+    run_study_as_script("wheelset")

@@ -37,7 +37,7 @@ def test_the_loose_sensor_is_left_out_and_the_rest_recovers_the_motion(tmp_path)
         # 20 m/s over the first hill: slow pitch of some hundredths that the filter takes away
         assert row["ways"]["high-passed"]["pitch"][0] > 0.01
     assert "'battery' does not move" in "\n".join(found["table"])
-    assert {"motion.png", "table.txt", "reference readings.csv", "mujoco, integrated.csv"} <= {
+    assert {"motion.png", "table.txt", "reference readings.csv", "mujoco, integrated.csv", "mujoco motion.nc"} <= {
         path.name for path in tmp_path.iterdir()
     }
 

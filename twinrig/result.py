@@ -112,7 +112,7 @@ class Result(saved.Result):
             raise InputError("", "plot", None, "name one channel or more", tuple(map(str, self.data.data_vars)))
         self._check(*channels)
         curves = dict(channels_of(self.data.reset_coords()[list(channels)]))
-        kinds = {(curve.unit, curve.over) for curve in curves.values()}
+        kinds = {(curve.unit, curve.grid_name) for curve in curves.values()}
         if len(kinds) != 1:
             kinds_text = " and ".join(sorted(f"{unit or '-'} over {axis_name}" for unit, axis_name in kinds)) or "text"
             raise InputError("", "plot", ", ".join(channels), f"holds {kinds_text}: plot numbers of one unit at a time")

@@ -127,6 +127,7 @@ def _share_text(relative_error: float) -> str:
 
 
 def _within_error_text(channel_comparison: ChannelComparison) -> str:
+    """Text if the rms error lies within the error that the run states; else ""."""
     return (
         f"; rms within the run's own error of {channel_comparison.stated:.2g}"
         if channel_comparison.rms <= channel_comparison.stated

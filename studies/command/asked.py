@@ -71,6 +71,7 @@ def check_for_any_engine(scene: Any, engines: tuple[str, ...]) -> None:
 
 
 def _is_runnable(scene: Any, engine: str) -> bool:
+    """Whether an engine passes all checks of a scene before its run."""
     try:
         checked_study(scene, (engine,))
     except InputError:

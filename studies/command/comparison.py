@@ -38,7 +38,7 @@ def compare(first_path: Path, second_path: Path) -> tuple[list[QuantityDifferenc
         a, b = (dict(_quantities_of_file(file)) for file in files)
         notes += _notes_on_missing(prefix, (files[0], a), (files[1], b))
         differences += [_quantity_difference(prefix + key, a[key], b[key], files[1]) for key in a if key in b]
-    return _sorted_by_share(differences, first_path, second_path), notes
+    return _sorted_by_relative_difference(differences, first_path, second_path), notes
 
 
 def compare_runs(
@@ -48,10 +48,12 @@ def compare_runs(
     ``run_names`` are the results' names in messages."""
     a, b = (dict(_with_stated_errors(run, channels_of(run.data))) for run in (first_run, second_run))
     differences = [_quantity_difference(key, a[key], b[key], run_names[1]) for key in a if key in b]
-    return _sorted_by_share(differences, *run_names), _notes_on_missing("", (run_names[0], a), (run_names[1], b))
+    return _sorted_by_relative_difference(differences, *run_names), _notes_on_missing(
+        "", (run_names[0], a), (run_names[1], b)
+    )
 
 
-def _sorted_by_share(
+def _sorted_by_relative_difference(
     differences: list[QuantityDifference], first_name: object, second_name: object
 ) -> list[QuantityDifference]:
     """Differences sorted by their size relative to the quantity, largest first; raises InputError if there are none."""
@@ -217,6 +219,7 @@ def _quantities_of_table(table_path: Path) -> Iterator[tuple[str, ResultQuantity
 
 
 def _numeric_cells(column_cells: tuple[str, ...]) -> np.ndarray | None:
+    """Numbers of a column's cells, NaN for empty ones; None if a cell is no number or all are empty."""
     try:
         values = np.array([float(cell) if cell.strip() else np.nan for cell in column_cells])
     except ValueError:

@@ -26,6 +26,7 @@ def summary_scalars(summary: dict[str, Any]) -> dict[str, float]:
 
 
 def _scalars_of(quantity_name: str, quantity_unit: str, summary_value: Any) -> Iterator[tuple[str, float]]:
+    """Yield name and value of every finite number in an entry of the summary."""
     if isinstance(summary_value, dict):
         quantity_unit = (
             f" [{summary_value['unit']}]"
@@ -44,6 +45,7 @@ def _scalars_of(quantity_name: str, quantity_unit: str, summary_value: Any) -> I
 
 
 def _numbers_of_list(quantity_name: str, quantity_unit: str, summary_list: list[Any]) -> Iterator[tuple[str, float]]:
+    """Yield name and value of every finite number in a list of the summary."""
     if len(summary_list) > LONGEST_LIST and all(isinstance(value, dict) for value in summary_list):
         columns = {
             key: [record[key] for record in summary_list if key in record]

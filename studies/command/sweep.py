@@ -61,9 +61,9 @@ class SweepJob:
     output_folder: Path
     with_error: bool = True
 
-    def __call__(self, point_numbers: range) -> ArraysByName:
+    def __call__(self, paths: range) -> ArraysByName:
         """Array "record" (n,): the record of each of the n points as JSON text."""
-        return _json_array(map(self.record, point_numbers))
+        return _json_array(map(self.record, paths))
 
     def prepared_point(self, point_number: int) -> tuple[Any, tuple[str, ...], Any]:
         """Scene, engines and study of a point of the sweep; raises InputError if the point cannot be run."""
@@ -120,6 +120,7 @@ def _json_array(point_records: Iterable[PointRecord]) -> ArraysByName:
 
 
 def _failed_record(failure_reason: object) -> PointRecord:
+    """Record of a point that has no results, with the reason."""
     return {"numbers": {}, "failed": {"": str(failure_reason)}, "results": {}}
 
 

@@ -177,7 +177,7 @@ def _draw_panel(
     if lost:
         foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "linestyle": "none"}
         axis.plot(sweep_positions[lost], np.full(len(lost), 0.04), **FAILED_MARK, **foot)
-    axis.set_title(wrapped_text(_with_unit(quantity_name), 0.47 * COLUMN_WIDTH, 9), fontsize=9)
+    axis.set_title(wrapped_text(_label_with_unit(quantity_name), 0.47 * COLUMN_WIDTH, 9), fontsize=9)
 
 
 def _draw_marks(
@@ -195,7 +195,7 @@ def _draw_marks(
             )
 
 
-def _with_unit(quantity_name: str) -> str:
+def _label_with_unit(quantity_name: str) -> str:
     """Label of a quantity with its unit. If the name holds no unit, the unit is "-" for counts and "SI" for all
     others."""
     return (

@@ -31,7 +31,7 @@ ReportProgress = Callable[[str, float], None]
 """Function that reports progress: the current task as text, and the finished share (0 to 1) of all work."""
 
 
-def _ignore_progress(activity: str, share: float) -> None:
+def _ignore_progress(task_text: str, finished_share: float) -> None:
     """Report no progress."""
 
 
@@ -53,16 +53,16 @@ class TwinOptions:
 @dataclass(frozen=True, eq=False)
 class ExaminedFile:
     """Results for a model file: the file as read, and the agreement of each build with it. explanations : for a build
-    that disagrees, the elements that cause it; misread : numbers of a URDF that MuJoCo's parser changed; path :
-    comparison of runs in time, None if not requested; price_lines : lines on the cost of accuracy; constraint_lines :
-    lines on dry friction and constraints.
+    that disagrees, the elements that cause it; misread_numbers : numbers of a URDF that MuJoCo's parser changed;
+    path_report : comparison of runs in time, None if not requested; price_lines : lines on the cost of accuracy;
+    constraint_lines : lines on dry friction and constraints.
     """
 
     file: ModelFile
     agreements: tuple[Agreement, ...]
     explanations: dict[str, list[tuple[Element, float]]]
-    misread: tuple[MisreadNumber, ...]
-    path: PathReport | None
+    misread_numbers: tuple[MisreadNumber, ...]
+    path_report: PathReport | None
     price_lines: tuple[str, ...] = ()
     constraint_lines: tuple[str, ...] = ()
 
@@ -74,7 +74,7 @@ class ExaminedFile:
     @property
     def is_certified(self) -> bool:
         """Whether all builds agree with the file, and MuJoCo's parser changed nothing."""
-        return all(agreement.alike for agreement in self.agreements) and not self.misread
+        return all(agreement.alike for agreement in self.agreements) and not self.misread_numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,10 +168,10 @@ def examine(
 
 
 def _report_progress(
-    report_progress: ReportProgress, file_number: int, file_count: int, activity: str, share: float
+    report_progress: ReportProgress, file_number: int, file_count: int, task_text: str, finished_share: float
 ) -> None:
     """Report the progress within one model file as a share of the progress of all files."""
-    report_progress(activity, (file_number + share) / file_count)
+    report_progress(task_text, (file_number + finished_share) / file_count)
 
 
 def _examine_file(
@@ -283,8 +283,10 @@ def twin_lines(twin_results: TwinResults) -> list[str]:
 def verdict_sentence(examined_file: ExaminedFile) -> str:
     """Sentence with the verdict on a model file: whether its builds move as it does."""
     worst = max(row.acceleration for row in examined_file.agreements)
-    if examined_file.misread:
-        return f"MuJoCo's parser made something else of {plural(len(examined_file.misread), 'number')} of the file"
+    if examined_file.misread_numbers:
+        return (
+            f"MuJoCo's parser made something else of {plural(len(examined_file.misread_numbers), 'number')} of the file"
+        )
     if examined_file.is_certified:
         bound = max(row.bound for row in examined_file.agreements)
         said = f"; up to {bound:.0e} may be rounding" if bound > EQUAL_ACCELERATION_SHARE else ""
@@ -311,12 +313,12 @@ def _file_lines(examined_file: ExaminedFile) -> list[str]:
     for build, elements in examined_file.explanations.items():
         said = ", ".join(f"{element.kind} of {element.owner}" for element, _ in elements[:3])
         rows.append(f"  {build}: {f'it is the {said}' if said else 'no single element explains it'}")
-    rows += [f"  {lost.sentence()}" for lost in examined_file.misread]
+    rows += [f"  {lost.sentence()}" for lost in examined_file.misread_numbers]
     rows += [f"  left out: {content.line()}" for content in examined_file.file.removed_contents]
     if examined_file.file.ignored_limits:
         rows.append(f"  {limits_sentence(examined_file.file.ignored_limits)}")
     rows += [f"  {note}" for note in (*examined_file.constraint_lines, *examined_file.file.notes)]
-    rows += [f"  {line}" for line in examined_file.path.lines()] if examined_file.path is not None else []
+    rows += [f"  {line}" for line in examined_file.path_report.lines()] if examined_file.path_report is not None else []
     return rows + [f"  {line}".rstrip() for line in examined_file.price_lines]
 
 

@@ -142,8 +142,8 @@ def _time_left_text(remaining_seconds: float | None, elapsed_seconds: float) -> 
     )
 
 
-def _duration_text(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
+def _duration_text(duration_seconds: float) -> str:
+    return f"{duration_seconds:.0f} s" if duration_seconds < 100.0 else f"{duration_seconds / 60.0:.0f} min"
 
 
 @contextmanager

@@ -57,6 +57,7 @@ def stage_and_motions(
 
 
 def _motion_of_engine(engine: str, assembly: Assembly, frame_times: np.ndarray) -> tuple[FilmedMotion, Channels]:
+    """Filmed motion of the vehicle in an engine with frames near the times (s), and the channels of its run."""
     model: Any = build(engine, assembly, settings_of(assembly.scene, engine))
     run = model.run()
     channels = output_channels(assembly, run)
@@ -67,6 +68,7 @@ def _motion_of_engine(engine: str, assembly: Assembly, frame_times: np.ndarray) 
 
 
 def _mujoco_poses(engine_model: Any, states: np.ndarray) -> Poses:
+    """Poses of the bodies by MuJoCo at states (f, n) of f frames."""
     names = [body.name for body in engine_model.assembly.vehicle.bodies]
     positions, turns = mujoco_poses(
         engine_model.model, {name: engine_model.model.body(name).id for name in names}, states

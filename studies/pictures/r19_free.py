@@ -71,6 +71,7 @@ def vehicle_with_road_forces(vehicle: SpatialVehicle) -> SpatialVehicle:
 def _motion_of_engine(
     engine: str, vehicle: SpatialVehicle, road: RoadPath, road_table: np.ndarray, frame_rows: np.ndarray
 ) -> FilmedMotion:
+    """Filmed motion of the car in an engine on a road table, with frames at some of its rows."""
     settings = Settings(INTEGRATORS[engine], road.step, (len(road_table) - 1) // 2 * road.step)
     model: Any = build(engine, vehicle, settings, SPEED, road_table)
     zero = np.zeros(len(vehicle.coordinates()))
@@ -89,6 +90,7 @@ def _motion_of_engine(
 
 
 def _exudyn_poses(engine_model: Any, positions: np.ndarray) -> Poses:
+    """Poses of the bodies by Exudyn at positions (f, n) of f frames."""
     markers = {
         body.name: engine_model.built.marker(body.name, body.position, True) for body in engine_model.vehicle.bodies
     }

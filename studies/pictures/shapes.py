@@ -87,9 +87,9 @@ def tyred_wheel(radius: float) -> list[PaintedSurface]:
     ]
 
 
-def box(x: float, y: float, z: float, colour: Colour) -> PaintedSurface:
+def box(x_length: float, y_length: float, z_length: float, colour: Colour) -> PaintedSurface:
     """Surface of a box about the origin with edge lengths x, y, z (m)."""
-    half = np.array([x, y, z]) / 2.0
+    half = np.array([x_length, y_length, z_length]) / 2.0
     return extruded_outline(np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half[[0, 2]], 2.0 * half[1], colour)
 
 

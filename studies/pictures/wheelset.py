@@ -53,6 +53,7 @@ def stage_and_motions(
 
 
 def _motion_of_engine(engine: str, duration: float, frame_times: np.ndarray) -> FilmedMotion:
+    """Filmed motion of the wheelset in an engine over a duration (s), with frames near the times (s)."""
     scene = build(
         {
             "title": "wheelset",

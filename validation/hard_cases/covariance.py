@@ -44,6 +44,7 @@ def covariance_error(engine_name: str, work_folder: Path) -> float:
 
 
 def _covariance_recursion() -> np.ndarray:
+    """Covariance of the states after all samples under force errors of 1 N, by the recursion along the path."""
     assembly = vehicle_with_added_forces(np.zeros((SAMPLES, 2)))
     assert isinstance(assembly.input, Sampled)
     return noise_covariances(ErrorPath(assembly, assembly.input, round(SAMPLE_PERIOD / STEP), SAMPLES), 1.0)[-1]

@@ -53,21 +53,21 @@ def scene_on_true_forces(
     return scene.model_copy(update={"start": {"pitch_rate": start_pitch_rate}} if start_pitch_rate else {})
 
 
-def figures_and_errors(disturbed_run: Result, true_result: Result, scene: Scene) -> tuple[RunFigures, RunErrors]:
+def run_figures_and_errors(disturbed_run: Result, true_result: Result, scene: Scene) -> tuple[RunFigures, RunErrors]:
     """Figures of a run that can be computed without the true run, and errors of the run against the true run."""
     return figures_of_run(disturbed_run, scene.vehicle_parameters()), errors_of_run(disturbed_run, true_result)
 
 
-def verdict_words(engine_name: str, scene: Scene, true_result: Result) -> tuple[str, str]:
+def run_verdict_words(engine_name: str, scene: Scene, true_result: Result) -> tuple[str, str]:
     """Words of the verdicts on a run in an engine, with and without knowledge of the true run."""
-    scores, wrong = figures_and_errors(simulate(scene, engine_name), true_result, scene)
+    scores, wrong = run_figures_and_errors(simulate(scene, engine_name), true_result, scene)
     known = verdict_without_true_run(scores, scene.effects, DURATION, AcceptanceLimits())
     return verdict_on_run(scores, wrong, scene.effects, AcceptanceLimits()).word, known.word
 
 
 def tumbled_verdict_error(engine_name: str, work_folder: Path) -> float:
     """Case: a free run that has turned over must be rejected, with and without the true run. Error: 1 if it is not."""
-    judged = verdict_words(
+    judged = run_verdict_words(
         engine_name, scene_on_true_forces(work_folder, true_run(), start_pitch_rate=WRONG_PITCH_RATE), true_run()
     )
     return float(judged != ("rejected", "rejected"))
@@ -76,7 +76,7 @@ def tumbled_verdict_error(engine_name: str, work_folder: Path) -> float:
 def tumbled_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: damage of a tumbled run from its vertical forces alone."""
     scene = scene_on_true_forces(work_folder, true_run(), start_pitch_rate=WRONG_PITCH_RATE)
-    scores, wrong = figures_and_errors(simulate(scene, "reference"), true_run(), scene)
+    scores, wrong = run_figures_and_errors(simulate(scene, "reference"), true_run(), scene)
     return (
         f"at a pitch of {scores.pitch_max:.1f} rad its vertical f3 does {wrong.vertical_damage['f3']:.3f} times the "
         f"true damage, its f3 along the chassis {wrong.damage['f3x']:.0e} times"
@@ -90,7 +90,7 @@ FIRM_SPRING = {"pitch_spring": {"stiffness": 300.0, "damping": 600.0}}
 def soft_spring_verdict_error(engine_name: str, work_folder: Path) -> float:
     """Case: a run with a stabilising spring that is too soft must be rejected. Error: 1 if it is not."""
     return float(
-        verdict_words(
+        run_verdict_words(
             engine_name, scene_on_true_forces(work_folder, true_run(), SOFT_SPRING, WRONG_PITCH_RATE), true_run()
         )[0]
         != "rejected"
@@ -100,7 +100,7 @@ def soft_spring_verdict_error(engine_name: str, work_folder: Path) -> float:
 def soft_spring_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: figures of the run itself, which do not show that the spring is too soft."""
     scene = scene_on_true_forces(work_folder, true_run(), SOFT_SPRING, WRONG_PITCH_RATE)
-    scores, wrong = figures_and_errors(simulate(scene, "reference"), true_run(), scene)
+    scores, wrong = run_figures_and_errors(simulate(scene, "reference"), true_run(), scene)
     return (
         f"its artificial moment is {scores.moment_share_band:.1%} of I pitch'' and its vertical f3 does "
         f"{wrong.vertical_damage['f3']:.3f} times the true damage; its pitch is {wrong.pitch_max:.2f} rad wrong"
@@ -110,14 +110,16 @@ def soft_spring_naive_result(work_folder: Path) -> str:
 def graded_verdict_error(engine_name: str, work_folder: Path) -> float:
     """Case: a stabilising spring on a grade, which gives wrong results. Error: 0 if the run is rejected with the true
     run and not accepted without it, else 1."""
-    judged = verdict_words(engine_name, scene_on_true_forces(work_folder, true_run(0.1), FIRM_SPRING), true_run(0.1))
+    judged = run_verdict_words(
+        engine_name, scene_on_true_forces(work_folder, true_run(0.1), FIRM_SPRING), true_run(0.1)
+    )
     return float(judged != ("rejected", "stabilise"))
 
 
 def graded_naive_result(work_folder: Path) -> str:
     """Figures of a run with a stabilising spring on a graded road, as text."""
     scene = scene_on_true_forces(work_folder, true_run(0.1), FIRM_SPRING)
-    scores, wrong = figures_and_errors(simulate(scene, "reference"), true_run(0.1), scene)
+    scores, wrong = run_figures_and_errors(simulate(scene, "reference"), true_run(0.1), scene)
     return (
         f"its artificial moment is {scores.moment_share_band:.1%} of I pitch''; its pitch is {wrong.pitch_max:.2f} "
         f"rad wrong, f3 along the chassis does {wrong.damage['f3x']:.2f} times the true damage"
@@ -194,13 +196,13 @@ def difference_before_drift(engine_name: str, work_folder: Path) -> float:
     scene = scene_on_true_forces(work_folder, true_run(), {"force_noise": {"deviation": HEAVY_FORCE_NOISE}})
     other_engine = "mujoco" if engine_name == "reference" else "reference"
     first, second_run = (simulate(scene, name) for name in (engine_name, other_engine))
-    rows_before = slice(None, _first_row_off(first, true_run()))
+    rows_before = slice(None, _first_drifted_row(first, true_run()))
     return largest_magnitude(first.states[rows_before] - second_run.states[rows_before]) / largest_magnitude(
         second_run.states[rows_before]
     )
 
 
-def _first_row_off(disturbed_run: Result, true_result: Result) -> int | None:
+def _first_drifted_row(disturbed_run: Result, true_result: Result) -> int | None:
     """First row at which the pitch of a run differs from the true pitch by more than DRIFTED_PITCH; None if it never
     does."""
     far = np.flatnonzero(np.abs(disturbed_run["pitch"] - true_result["pitch"]) > DRIFTED_PITCH)
@@ -214,7 +216,7 @@ def before_drift_naive_result(work_folder: Path) -> str:
     scene = force_scene(work_folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY_FORCE_NOISE}})
     coarse, fine = (simulate(scene, "reference", Settings("RK4", step, 30.0)) for step in (1e-3, 5e-4))
     gap = np.abs(coarse["pitch"] - fine["pitch"][::2])
-    gap_before = gap[: _first_row_off(coarse, truth)].max()
+    gap_before = gap[: _first_drifted_row(coarse, truth)].max()
     return f"two step sizes of the reference differ by {gap_before:.0e} rad before, {gap.max():.0e} after"
 
 

@@ -32,10 +32,11 @@ def _distance_from_equilibrium(engine_name: str, base_assembly: Assembly, integr
 def undamped_error(engine_name: str, work_folder: Path) -> float:
     """Case: a vehicle without any dampers for 1 s. Error: difference of the states from the matrix exponential, divided
     by the largest motion."""
-    return _ringing_error(engine_name)
+    return _undamped_motion_error(engine_name)
 
 
-def _ringing_error(engine_name: str, integrator: str = "") -> float:
+def _undamped_motion_error(engine_name: str, integrator: str = "") -> float:
+    """Difference of the undamped vehicle's states from the exact ones, divided by the largest motion."""
     base, truth = _undamped_vehicle()
     return largest_magnitude(run(engine_name, base, 1e-3, 1.0, integrator).states - truth) / largest_magnitude(
         truth - base.initial
@@ -61,7 +62,9 @@ def undamped_naive_result(work_folder: Path) -> str:
 def undamped_euler_error(engine_name: str, work_folder: Path) -> float:
     """Case: undamped oscillation by an explicit first-order method, which makes it grow. Error: difference of the
     states from the matrix exponential, divided by the largest motion."""
-    return _ringing_error(engine_name, {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine_name])
+    return _undamped_motion_error(
+        engine_name, {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine_name]
+    )
 
 
 def light_wheel_error(engine_name: str, work_folder: Path) -> float:

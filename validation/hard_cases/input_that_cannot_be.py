@@ -79,17 +79,20 @@ def error_texts(change_forces: ForceChange) -> list[str]:
     return [finding.text for finding in findings if finding.weight == "doubt"]
 
 
-def _missed_doubts(change_forces: ForceChange, is_doubted: bool, _: str, work_folder: Path) -> float:
+def _missed_doubt_error(change_forces: ForceChange, is_doubted: bool, _: str, work_folder: Path) -> float:
+    """Difference between the number of doubts about changed wheel forces and the wanted number, 1 or 0."""
     return abs(len(error_texts(change_forces)) - is_doubted)
 
 
-def _unqueried_vehicle(parameter_changes: dict[str, float], _: str, work_folder: Path) -> float:
+def _unqueried_vehicle_error(parameter_changes: dict[str, float], _: str, work_folder: Path) -> float:
+    """1 if the check of vehicle parameters has no doubt about a vehicle with changed parameters, else 0."""
     return float(not plausible_plane(TWIN.model_copy(update=parameter_changes)))
 
 
-def _refusal_case(
+def _input_check_case(
     case_name: str, error_function: Callable[[str, Path], float], expected_ending: OutcomeWord, message: str
 ) -> HardCase:
+    """Hard case of an input that the check must refuse, doubt or accept, with a phrase on what it must say."""
     expected: dict[str, OutcomeWord] = (
         dict.fromkeys(IMPLEMENTATIONS, expected_ending) if expected_ending != "right" else {}
     )
@@ -108,23 +111,27 @@ def _refusal_case(
 
 CASES = (
     *(
-        _refusal_case(
-            name, partial(_missed_doubts, change, True), "refused", "refused before the run, with what is wrong"
+        _input_check_case(
+            name, partial(_missed_doubt_error, change, True), "refused", "refused before the run, with what is wrong"
         )
         for name, change in REFUSED.items()
     ),
     *(
-        _refusal_case(
+        _input_check_case(
             name,
-            partial(_missed_doubts, change, True),
+            partial(_missed_doubt_error, change, True),
             "right",
             "one doubt before the run, with the fall or turn to come",
         )
         for name, change in DOUBTED.items()
     ),
-    _refusal_case("true wheel forces", partial(_missed_doubts, lambda f: f, False), "right", "nothing is said"),
+    _input_check_case(
+        "true wheel forces", partial(_missed_doubt_error, lambda f: f, False), "right", "nothing is said"
+    ),
     *(
-        _refusal_case(name, partial(_unqueried_vehicle, change), "right", "queried, with the value and what is usual")
+        _input_check_case(
+            name, partial(_unqueried_vehicle_error, change), "right", "queried, with the value and what is usual"
+        )
         for name, change in QUERIED.items()
     ),
 )

@@ -150,6 +150,7 @@ def _spinning_assembly(geometry: str) -> Assembly:
 
 @cache
 def _tumbled_states() -> np.ndarray:
+    """States of the tumbling vehicle over 1 s, every 0.25 ms, by the solution of order 8."""
     return tight_solution(_spinning_assembly("exact"), 2.5e-4, 1.0).states
 
 

@@ -51,11 +51,13 @@ def long_wave_error(engine_name: str, work_folder: Path) -> float:
 
 
 def _monte_carlo_run(corner_wavenumber: float) -> Any:
+    """Statistics of 20 copies of the quarter car in time, on a road with a corner wavenumber (rad/m)."""
     vehicle, road = _vehicle_and_road(corner_wavenumber)
     return copies_in_time(vehicle, road, 5.0, 1.0, copy_count=20, seed=1, longest_step=2e-3)
 
 
 def _vehicle_and_road(corner_wavenumber: float) -> tuple[SpatialVehicle, Excitation]:
+    """Nonlinear quarter car, and a random road with a corner wavenumber (rad/m)."""
     scene = build(
         {
             "title": "hard",

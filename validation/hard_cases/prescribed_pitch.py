@@ -61,6 +61,7 @@ def _settled_state() -> np.ndarray:
 
 
 def _settled_assembly(base_assembly: Assembly) -> Assembly:
+    """The vehicle with the settled state as its initial state."""
     base_assembly.initial[:] = _settled_state()
     return base_assembly
 
@@ -171,14 +172,14 @@ def undamped_multiplier_naive_result(work_folder: Path) -> str:
     return f"moment of {root_mean_square(exact_enforced_moment()):.0f} N m off over the last 0.1 s: {', '.join(parts)}"
 
 
-def noise_gain(engine_name: str, work_folder: Path) -> float:
+def enforced_moment_noise_gain(engine_name: str, work_folder: Path) -> float:
     """Case: noise of 1e-6 rad on the pitch samples. Error: enforced moment that it causes, divided by its
     finite-difference value."""
     return _noisy_moment(engine_name, 1e-3)
 
 
-def noise_gain_fine(engine_name: str, work_folder: Path) -> float:
-    """Case of ``noise_gain`` in steps of 0.125 ms."""
+def noise_gain_with_fine_steps(engine_name: str, work_folder: Path) -> float:
+    """Case of ``enforced_moment_noise_gain`` in steps of 0.125 ms."""
     return _noisy_moment(engine_name, 1.25e-4)
 
 
@@ -335,7 +336,7 @@ CASES = (
         "I s sqrt(6) / dt^2",
         3.0,
         "the finite-difference value; the spline's own gain is below 3",
-        noise_gain,
+        enforced_moment_noise_gain,
         {"exudyn": "raised"},
         noise_naive_result,
         answer_independence="native",
@@ -347,7 +348,7 @@ CASES = (
         "I s sqrt(6) / dt^2",
         3.0,
         "as above",
-        noise_gain_fine,
+        noise_gain_with_fine_steps,
         answer_independence="native",
     ),
     HardCase(

@@ -19,20 +19,20 @@ FAULT_SIZE_TOLERANCE = 0.2
 
 def planted_fault_case(
     check_name: str,
-    expected_place: str,
+    expected_error_place: str,
     fault_size: float | None,
     spoil_recording: bench.Spoil | None = None,
     **planted_faults: Any,
 ) -> Callable[[str, Path], float]:
     """Case: a recording with one planted fault. Error: relative error of the size that the check finds; infinite unless
-    ``check_name`` reports the fault first, and all findings name ``expected_place``."""
+    ``check_name`` reports the fault first, and all findings name ``expected_error_place``."""
 
     def error(engine_name: str, work_folder: Path) -> float:
         findings = bench.planted_findings(bench.measurement(road=ROAD), work_folder, spoil_recording, **planted_faults)
         if (
             not findings
             or findings[0].check != check_name
-            or not all(expected_place in finding.place for finding in findings)
+            or not all(expected_error_place in finding.place for finding in findings)
         ):
             return np.inf
         return 0.0 if fault_size is None else abs((findings[0].size or 0.0) / fault_size - 1.0)

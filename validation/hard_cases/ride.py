@@ -140,6 +140,8 @@ def toppling_car_error(engine_name: str, work_folder: Path) -> float:
 
 
 def _error_unless_refused(vehicle: LinearVehicle) -> float:
+    """Raises the refusal of an unstable vehicle if both routes to the variances state the right growth rate; else
+    infinite."""
     road, growing = paper_road(vehicle.wheels), float(eigenvalues(vehicle).real.max())
     for route in (
         lambda: stationary_covariance(vehicle_with_road(vehicle, road, SPEED)),
@@ -173,6 +175,7 @@ def no_delay_error(engine_name: str, work_folder: Path) -> float:
 
 
 def _deviations_of_ride(vehicle: LinearVehicle, speed: float = SPEED, axle_correlation: str = "delayed") -> np.ndarray:
+    """Standard deviations of the outputs on the paper's road at a speed (m/s)."""
     return stationary_covariance(
         vehicle_with_road(vehicle, paper_road(vehicle.wheels, "modelled", axle_correlation), speed)
     ).deviation
@@ -204,7 +207,7 @@ def slow_weighting_error(engine_name: str, work_folder: Path) -> float:
     return largest_relative_error(variance, wanted)
 
 
-def standstill_error(engine_name: str, work_folder: Path) -> float:
+def drive_with_standstill_error(engine_name: str, work_folder: Path) -> float:
     """Case: a drive that starts and ends with a stop. Error: largest relative change of the road height's variance
     under each wheel."""
     vehicle = linear_equations(load_vehicle("half_car"), engine_name)
@@ -226,7 +229,7 @@ def invalid_speeds_error(engine_name: str, work_folder: Path) -> float:
     raise refusal
 
 
-def wrong_entry_case(spoil_table: VehicleTableChange, expected_place: str) -> Callable[..., float]:
+def wrong_entry_case(spoil_table: VehicleTableChange, expected_error_place: str) -> Callable[..., float]:
     """Case: the half car's file with a wrong entry must be refused with the entry's name."""
 
     def error(engine_name: str, work_folder: Path) -> float:
@@ -235,7 +238,7 @@ def wrong_entry_case(spoil_table: VehicleTableChange, expected_place: str) -> Ca
         try:
             vehicle = build_vehicle(table, "half_car.toml")
         except InputError as refusal:
-            if expected_place not in refusal.place:
+            if expected_error_place not in refusal.place:
                 return np.inf
             raise
         return float(np.isfinite(_deviations_of_ride(linear_equations(vehicle, engine_name))).all()) + 1.0
@@ -244,6 +247,7 @@ def wrong_entry_case(spoil_table: VehicleTableChange, expected_place: str) -> Ca
 
 
 def _add_unconnected_body(vehicle_table: dict[str, Any]) -> None:
+    """Add a body without any spring to the table of a vehicle."""
     vehicle_table["bodies"].append({"name": "box", "mass": 5.0, "position": [0.0, 0.0, 1.0], "freedoms": ["z"]})
 
 
@@ -387,7 +391,7 @@ CASES = (
         "",
         1e-10,
         "rounding",
-        standstill_error,
+        drive_with_standstill_error,
     ),
     HardCase(
         "damper of the wrong sign",

@@ -206,12 +206,14 @@ def mirror_error(engine_name: str, work_folder: Path) -> float:
     return float(np.abs(straight - MIRROR_SIGNS * other_path).max())
 
 
-def refusal_error(engine_name: str, work_folder: Path, expected_place: str, run_engine: Callable[[str], Any]) -> float:
-    """Case: ``run_engine`` must be refused with the name ``expected_place``. Error: infinite if it is not."""
+def refusal_error(
+    engine_name: str, work_folder: Path, expected_error_place: str, run_engine: Callable[[str], Any]
+) -> float:
+    """Case: ``run_engine`` must be refused with the name ``expected_error_place``. Error: infinite if it is not."""
     try:
         run_engine(engine_name)
     except InputError as refusal:
-        if expected_place in refusal.place:
+        if expected_error_place in refusal.place:
             raise
     return np.inf
 
@@ -418,7 +420,7 @@ CASES = (
             "",
             0.0,
             "exact",
-            partial(refusal_error, expected_place=place, run_engine=run),
+            partial(refusal_error, expected_error_place=place, run_engine=run),
             REFUSED,
         )
         for name, place, run in (

@@ -58,6 +58,7 @@ def dead_band_edge_error(engine_name: str, work_folder: Path) -> float:
 
 @cache
 def _exact_motion_with_kinks() -> Trajectory:
+    """Motion with the dead band by the solution of order 8."""
     return tight_solution(vehicle_with_pitch_spring(DEAD_BAND), STEP, DURATION)
 
 
@@ -69,6 +70,7 @@ def kink_naive_result(work_folder: Path) -> str:
 
 
 def _add_limit_stop(exudyn_build: exudyn_engine.PitchPlaneBuild, pitch_spring: PitchSpring) -> None:
+    """Add Exudyn's limit stops at the edges of the dead band, in place of the pitch spring."""
     state = exudyn_build.mbs.AddNode(items.NodeGenericData(initialCoordinates=[0, 0, 0], numberOfDataCoordinates=3))
     exudyn_build.mbs.AddObject(
         items.CoordinateSpringDamperExt(
@@ -111,6 +113,7 @@ def moving_moment_error(engine_name: str, work_folder: Path) -> float:
 
 @cache
 def _exact_motion_with_moment() -> Trajectory:
+    """Motion under held forces and the interpolated moment by the solution of order 8."""
     return tight_solution(vehicle_under_held_forces(), STEP, DURATION)
 
 
@@ -151,6 +154,7 @@ def guided_assembly(noise_deviation: float = 0.0, mass_factor: float = 1.0) -> A
 
 
 def _guided_run(engine_name: str, assembly: Assembly) -> Trajectory:
+    """Run with prescribed heave and pitch in steps of 0.25 ms."""
     return run(engine_name, assembly, 2.5e-4, DURATION, CONSTRAINED_INTEGRATORS[engine_name])
 
 
