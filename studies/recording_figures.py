@@ -25,7 +25,7 @@ from models.fatigue.counting import CountedLoad
 from models.measured.checks.agreement import MeasurementFault, SignalGroup
 from models.measured.checks.evidence import Evidence
 from models.measured.signal import UNIT_OF_QUANTITY, Signal
-from models.systems.measured.holds import FREE_RUN
+from models.systems.measured.holds import FREE_RUN_NAME
 from models.systems.measured.run import RecordingAnalysis
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.sections import SectionChannel
@@ -44,7 +44,7 @@ LOUD_COLOUR, QUIET_COLOUR, MARK_COLOUR = VERMILION, TRUTH_COLOUR, YELLOW
 RUN_STYLES = {
     "measured": ("measured", MEASURED_COLOUR),
     "truth": ("truth", TRUTH_COLOUR),
-    FREE_RUN: ("free run", LOUD_COLOUR),
+    FREE_RUN_NAME: ("free run", LOUD_COLOUR),
     "kalman": ("held by the Kalman filter", BLUE),
     "prescribed": ("held to the measured angles", BLUE),
 }
@@ -265,7 +265,11 @@ def drift_figure(examination: RecordingAnalysis, path: Path) -> Path:
         for name, (times_of_run, values) in curves.items():
             label, colour = RUN_STYLES[name]
             panel.plot(*thinned_curve(times_of_run, np.degrees(values)), color=colour, label=label, lw=1.0)
-        if examination.drift is not None and examination.chosen_run != FREE_RUN and examination.chosen_run in curves:
+        if (
+            examination.drift is not None
+            and examination.chosen_run != FREE_RUN_NAME
+            and examination.chosen_run in curves
+        ):
             chosen_angles = np.interp(examination.drift.times, *curves[examination.chosen_run])
             spread = examination.drift.deviations[:, ("roll", "pitch").index(angle)]
             label = "free run as predicted, 1 standard deviation"

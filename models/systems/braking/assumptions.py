@@ -18,7 +18,7 @@ from models.systems.braking.of_scene import measured_pressures_of, tyre_tables_o
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import HITCH_SUFFIX, SLOWEST_SLIP_SPEED, StopHistory, wheel_names
 
-WITHOUT_VALVES = ("none", "slip_pi")
+CONTROLLERS_WITHOUT_VALVES = ("none", "slip_pi")
 """Controllers that never switch valves on and off."""
 LEAST_WHEEL_LOAD = 1.0
 """Wheel load (N) below which a wheel has left the road."""
@@ -267,7 +267,7 @@ def _resolved_speed(vehicle: BrakedVehicle, run_result: Result) -> Watched:
 
 def _brake_assumptions(scene: BrakingScene, procedure_name: str, vehicle: BrakedVehicle) -> Iterator[Assumption]:
     """Yields assumptions on brake pressures, brake work and the valves that set the pressures."""
-    port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in WITHOUT_VALVES
+    port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in CONTROLLERS_WITHOUT_VALVES
     if sets_valves and scene.pressure is None:
         yield Assumption(
             "chambers",

@@ -45,8 +45,8 @@ from models.systems.contact.scene import ContactScene, scene_errors
 from models.systems.contact.stated_error import with_error, with_error_of_rows
 
 BUILT_IN_PROFILES = {"wheel": WHEELS, "rail": RAILS}
-FORCES_OF_ROLLED = attrgetter("fx", "fy", "mz", "stick", "dissipation")
-ERRORS_OF_ROLLED = attrgetter("cells", "theory", "moment_cells", "moment_theory")
+FORCES_OF_ROLLED_CONTACT = attrgetter("fx", "fy", "mz", "stick", "dissipation")
+ERRORS_OF_ROLLED_CONTACT = attrgetter("cells", "theory", "moment_cells", "moment_theory")
 CONTACT_CHANNELS = {
     "xi_x": ("-", "longitudinal creepage"),
     "xi_y": ("-", "lateral creepage"),
@@ -61,8 +61,8 @@ CONTACT_CHANNELS = {
     "moment_error_of_cells": ("N m", "error of the moment that the cells leave"),
     "moment_error_of_theory": ("N m", "error of the moment that the theory has"),
 }
-"""Units and meanings of a motion, of its forces (``FORCES_OF_ROLLED``) and of their errors (``ERRORS_OF_ROLLED``), in
-this order.
+"""Units and meanings of a motion, of its forces (``FORCES_OF_ROLLED_CONTACT``) and of their errors
+(``ERRORS_OF_ROLLED_CONTACT``), in this order.
 """
 FIELD_UNITS = {"x": "m", "y": "m", "dx": "m", "dy": "m", "pressure": "Pa", "px": "Pa", "py": "Pa", "slips": "-"}
 ERROR_ORDER_OF_CELLS = {"linear": None, "fastsim": 2, "simplified": 2, "exact": 4}
@@ -158,8 +158,10 @@ def _labelled_result(scene: ContactScene, contact_results: ContactResults, run_s
         len(contact_results.motions),
         ERROR_ORDER_OF_CELLS[scene.method.name],
     )
-    errors: list[tuple[float, ...]] = [ERRORS_OF_ROLLED(error) for error in contact_results.errors] or [()] * count
-    rows = zip(contact_results.motions, map(FORCES_OF_ROLLED, contact_results.rolled), errors, strict=True)
+    errors: list[tuple[float, ...]] = [ERRORS_OF_ROLLED_CONTACT(error) for error in contact_results.errors] or [
+        ()
+    ] * count
+    rows = zip(contact_results.motions, map(FORCES_OF_ROLLED_CONTACT, contact_results.rolled), errors, strict=True)
     columns = np.array([[*motion, *forces, *errors_of_forces] for motion, forces, errors_of_forces in rows]).T
     doubt = ""
     if isinstance(contact, LinearTheory):

@@ -5,7 +5,7 @@ from models.multibody.numbers import Handling
 from models.systems.handling.run import driven_model
 from models.systems.handling.scene import HandlingScene
 
-AXES = "x forward, y left, z up; the carrier has x, y and yaw, the sway z, roll and pitch; zero is the design."
+AXES_TEXT = "x forward, y left, z up; the carrier has x, y and yaw, the sway z, roll and pitch; zero is the design."
 
 
 def exported(scene: HandlingScene, engine: str) -> Exported:
@@ -14,7 +14,7 @@ def exported(scene: HandlingScene, engine: str) -> Exported:
     """
     handling = scene.car(next(iter(scene.manoeuvres)))
     return export_handling(
-        engine, handling, ExportSubject(scene.title, scene.file, AXES), ["the driver's steer and torques"]
+        engine, handling, ExportSubject(scene.title, scene.file, AXES_TEXT), ["the driver's steer and torques"]
     )
 
 

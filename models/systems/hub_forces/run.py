@@ -24,7 +24,7 @@ from models.engines.cut_vehicle import ForceRoute, HubModel, HubRun, build
 from models.engines.error_control import NO_ESTIMATE
 from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
+from models.systems.hub_forces.assumptions import RUN_ON_TYRES, assumptions
 from models.systems.hub_forces.measurement import HubForces, MeasuredAngles, recorded_measurement, road_under_wheels
 from models.systems.hub_forces.scene import ForceFrame, HubScene, StabiliserMethod, TwoTrackRoadTable
 from models.vehicles.cut_vehicle import ANGLES, PITCH, ROLL, CutVehicle, X, Y, Z
@@ -293,7 +293,7 @@ def labelled_result(
     measurement: HubMeasurement,
     hub_run: HubRun,
     engine: str,
-    stabiliser_method: str = ON_TYRES,
+    stabiliser_method: str = RUN_ON_TYRES,
     run_seconds: float = 0.0,
 ) -> Result:
     """Returns the result of a run: motion of the chassis, section forces of all elements, moments of the stabiliser on

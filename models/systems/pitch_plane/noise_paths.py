@@ -29,7 +29,7 @@ from models.ensemble.runner import PathFailed
 from models.ensemble.store import Arrays
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, effects_in_order, settings_of
 
-DRIFT_OFF_PITCH = 0.05
+LARGEST_PITCH_BEFORE_DRIFT_OFF = 0.05
 """Difference (rad) from the true pitch beyond which a path has drifted off, unless the job has another threshold."""
 
 
@@ -53,7 +53,7 @@ class NoisePaths:
     settings: Settings
     rows: np.ndarray
     truth: np.ndarray
-    threshold: float = DRIFT_OFF_PITCH
+    threshold: float = LARGEST_PITCH_BEFORE_DRIFT_OFF
 
     def assembly(self, noise_path: int) -> Assembly:
         """Returns the assembly of the scene with the noise path of a number."""
@@ -116,7 +116,7 @@ def noise_paths(
     scene: Scene,
     saved_times: np.ndarray,
     true_states: np.ndarray | None = None,
-    drift_off_pitch: float = DRIFT_OFF_PITCH,
+    drift_off_pitch: float = LARGEST_PITCH_BEFORE_DRIFT_OFF,
     engine: str = "reference",
 ) -> NoisePaths:
     """Returns the job that runs a scene's noise paths; states are returned at ``saved_times`` (s), multiples of the
@@ -231,7 +231,7 @@ def mujoco_threads(
     scene: Scene,
     saved_times: np.ndarray,
     true_states: np.ndarray | None = None,
-    drift_off_pitch: float = DRIFT_OFF_PITCH,
+    drift_off_pitch: float = LARGEST_PITCH_BEFORE_DRIFT_OFF,
     thread_count: int = 2,
 ) -> MujocoThreads:
     """Returns the job that runs a scene's noise paths in MuJoCo with several threads; arguments as of

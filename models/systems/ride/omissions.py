@@ -19,8 +19,8 @@ SIMILAR_STIFFNESS_FACTOR = 2.0
 """Largest ratio of two stiffnesses in a group of bushings that are made rigid together, and ratio of a bushing's to the
 softest stiffness between the same bodies that it must exceed.
 """
-ALL_WHEELS = "mass of all wheels"
-TYRE_DAMPING = "tyre damping"
+ALL_WHEELS_EFFECT = "mass of all wheels"
+TYRE_DAMPING_EFFECT = "tyre damping"
 """Names of effects to which other effects refer."""
 LAW_TEXTS = {"travel_force": "curves over travel", "rate_force": "curves over rate", "friction": "friction"}
 """Nonlinear laws of springs, and the name of the effect that replaces them in all springs: stops, curved dampers, dry
@@ -102,7 +102,7 @@ def body_mass_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
         white = reduced_scene.ride_scene.road.cutoff is None and any(
             t.damping and t.body in massless_bodies for t in vehicle.tyres
         )
-        needs = (TYRE_DAMPING,) if white else ()
+        needs = (TYRE_DAMPING_EFFECT,) if white else ()
         why = "for the road's white noise would reach a body without mass" if white else "one names the other's bodies"
         says = f"{', '.join(massless_bodies)} without mass"
         return OmissibleEffect(
@@ -115,8 +115,8 @@ def body_mass_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
             is_singular=True,
         )
 
-    effects = [effect(ALL_WHEELS, sorted(wheels), tuple(groups))]
-    effects += [effect(name, bodies, (ALL_WHEELS,)) for name, bodies in groups.items() if len(axles) > 1]
+    effects = [effect(ALL_WHEELS_EFFECT, sorted(wheels), tuple(groups))]
+    effects += [effect(name, bodies, (ALL_WHEELS_EFFECT,)) for name, bodies in groups.items() if len(axles) > 1]
     carriers = wheels | {body.parent for body in vehicle.bodies}
     largest_light_mass = LIGHT_BODY_SHARE * sum(body.mass for body in vehicle.bodies)
     light = [body.name for body in vehicle.bodies if body.name not in carriers and body.mass < largest_light_mass]
@@ -237,7 +237,7 @@ def second_corner_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
     """
     if reduced_scene.ride_scene.road.cutoff is None:
         return []
-    needs = (TYRE_DAMPING,) if any(tyre.damping for tyre in reduced_scene.vehicle.tyres) else ()
+    needs = (TYRE_DAMPING_EFFECT,) if any(tyre.damping for tyre in reduced_scene.vehicle.tyres) else ()
     says, why = "road filters of first order", "for it would pass white noise"
     return [OmissibleEffect("second corner of the road", partial(on_road, cutoff=None), says, needs, why=why)]
 
@@ -256,7 +256,9 @@ def second_track_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
 def tyre_damping_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
     """Returns the effect that leaves out the damping of tyres; none where no tyre is damped."""
     damped = any(tyre.damping for tyre in reduced_scene.vehicle.tyres)
-    return [OmissibleEffect(TYRE_DAMPING, _without_damping, "tyres are springs without damping")] if damped else []
+    return (
+        [OmissibleEffect(TYRE_DAMPING_EFFECT, _without_damping, "tyres are springs without damping")] if damped else []
+    )
 
 
 def _without_damping(reduced_scene: ReducedScene) -> ReducedScene:
