@@ -282,4 +282,5 @@ def _estimate_of_channel(
 
 
 def _rms(values: np.ndarray) -> float:
+    """Root mean square of values."""
     return float(np.sqrt(np.mean(np.square(values))))

@@ -250,6 +250,7 @@ def _line_count(text_path: Path) -> int:
 
 
 def _count_rows(report_progress: Progress, total_rows: int, finished_rows: int) -> None:
+    """Report how many rows of all are finished."""
     report_progress(f"{finished_rows:,} of {total_rows:,} rows", min(finished_rows / max(total_rows, 1), 1.0))
 
 

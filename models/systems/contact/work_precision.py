@@ -149,6 +149,8 @@ class TheorySettings:
 
 
 def _fastsim(**fastsim_choices: Any) -> Callable[[ContactCase, int], ForcesOfMotion]:
+    """Returns a function that makes, for a case and a number of cells, the function of the creepages by FASTSIM."""
+
     def rolled(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
         ellipse = Ellipse(contact_case.a / contact_case.b, contact_case.pair, cells=cell_count, **fastsim_choices)
         return lambda motion: ellipse(contact_case.a, contact_case.load, contact_case.friction, *motion)
@@ -157,6 +159,7 @@ def _fastsim(**fastsim_choices: Any) -> Callable[[ContactCase, int], ForcesOfMot
 
 
 def _simplified(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
+    """Returns the function of the creepages that computes the forces of a case by the simplified theory."""
     pressed = interpenetration_contact(
         by_axes(contact_case.a, contact_case.b, contact_case.pair, load=contact_case.load), contact_case.pair
     )
@@ -165,6 +168,8 @@ def _simplified(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
 
 
 def _rolled_by_theory(theory_class: Callable[..., OnEllipse]) -> Callable[[ContactCase, int], ForcesOfMotion]:
+    """Returns a function that makes, for a case and a number of cells, the function of the creepages by a theory."""
+
     def rolled(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
         contact = contact_case.contact(theory_class)
         return lambda motion: contact.roll(motion, cell_count)
@@ -244,6 +249,7 @@ LEAST_TIMED_SECONDS = 2e-5
 
 
 def _forces_and_seconds(forces_of_motion: ForcesOfMotion, motion: Motion, repeat_count: int) -> tuple[Any, float]:
+    """Forces of a motion, and median time (s) of one evaluation over the repeats."""
     start = time.perf_counter()
     answer = forces_of_motion(motion)
     count = max(1, int(LEAST_TIMED_SECONDS / max(time.perf_counter() - start, 1e-7)))

@@ -179,7 +179,7 @@ def run(
     whole_run: bool = False,
     error: bool = False,
 ) -> Result:
-    """Run a recording with the scene's stabiliser; the result's detail is the Examination.
+    """Run a recording with the scene's stabiliser; the result's detail is the ``RecordingAnalysis``.
 
     folder : folder of all samples, from which an interrupted run is resumed; without a folder they live as long as the
     detail. whole_run : whether the recording is also checked, run free and judged, and section forces are written to
@@ -250,7 +250,7 @@ def _with_error(run_result: Result, recording_analysis: RecordingAnalysis, work_
 def _start_examination(
     scene: MeasuredScene, engine: str, output_folder: Path, report_progress: Progress, estimate_error: bool
 ) -> RecordingAnalysis:
-    """Start an examination: resample the recording from the scene's files, or from those of a virtual measurement."""
+    """Start the analysis: resample the recording from the scene's files, or from those of a virtual measurement."""
     rig, virtual, seconds, start_time = scene.rig(), None, dict[str, float](), time.perf_counter()
     (output_folder / WORK_FOLDER).mkdir(parents=True, exist_ok=True)
     if scene.virtual is not None and rig.vehicle is not None:
@@ -466,7 +466,7 @@ def _save_section_forces(
 
 
 def _labelled_result(scene: MeasuredScene, recording_analysis: RecordingAnalysis, output_folder: Path) -> Result:
-    """Returns the result of a recording's scene; its detail is the examination."""
+    """Returns the result of a recording's scene; its detail is the ``RecordingAnalysis``."""
     return labelled_result(
         scene,
         recording_analysis.outcome,

@@ -291,6 +291,7 @@ def figures_of_run(run_outcome: SectionOutcome, vehicle: CutVehicle) -> RunFigur
 
 
 def _rms_ratio(part_values: np.ndarray, total_values: np.ndarray) -> float:
+    """Root mean square of some values divided by that of all; 1 or 0 where all of them are 0."""
     return (
         root_mean_square(part_values) / root_mean_square(total_values)
         if root_mean_square(total_values) > 0

@@ -141,6 +141,7 @@ def _with_longer_engine_step(run_with_settings: Callable[[Settings], Series], so
 
 
 def _series_of_run(times: np.ndarray, run_channels: Channels, channel_names: tuple[str, ...]) -> Series:
+    """Time series of the named channels of a run."""
     return Series(times, {name: run_channels[name][2] for name in channel_names})
 
 
@@ -263,6 +264,7 @@ def _force_channels(vehicle_assembly: Assembly, trajectory: Trajectory, input_va
 def _wheel_forces(
     vehicle_assembly: Assembly, states: np.ndarray, input_values: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Front and rear wheel force (n,) in N, positive up, from states and inputs."""
     p = vehicle_assembly.parameters
     if vehicle_assembly.mode not in ("free", "road"):
         assert input_values is not None

@@ -87,6 +87,7 @@ def _tyre_assumptions(vehicle: SpatialVehicle, values_of_motion: ValuesByName) -
 
 
 def _with_static_load(dynamic_loads: np.ndarray | Gaussian, static_load: float) -> np.ndarray | Gaussian:
+    """Dynamic tyre loads (N) with the static load (N) added."""
     return (
         replace(dynamic_loads, mean=dynamic_loads.mean + static_load)
         if isinstance(dynamic_loads, Gaussian)

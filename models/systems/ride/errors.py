@@ -60,6 +60,7 @@ def with_changed_last_digits(
 
 
 def _symmetrised(matrix: np.ndarray) -> np.ndarray:
+    """Symmetric part of a matrix."""
     return (matrix + matrix.T) / 2.0
 
 

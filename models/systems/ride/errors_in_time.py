@@ -157,6 +157,7 @@ def with_error_of_copies(
 
 
 def _rms_over_speeds(deviation_rows: Sequence[np.ndarray]) -> np.ndarray:
+    """Root mean square over the rows, one for each speed."""
     with np.errstate(invalid="ignore"):
         return np.nan_to_num(np.sqrt(np.mean(np.square(deviation_rows), axis=0)))
 

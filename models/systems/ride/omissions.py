@@ -52,6 +52,7 @@ def effects_of(reduced_scene: ReducedScene) -> tuple[OmissibleEffect, ...]:
 
 
 def _without_table(reduced_scene: ReducedScene, table_name: str) -> ReducedScene:
+    """Returns the scene without one of its tables [effects.NAME]."""
     return reduced_scene.without_tables(table_name)
 
 
@@ -80,6 +81,7 @@ def anti_roll_bar_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
 
 
 def _without_bar(reduced_scene: ReducedScene, bar_name: str) -> ReducedScene:
+    """Returns the scene without an anti-roll bar."""
     bars = tuple(kept_bar for kept_bar in reduced_scene.vehicle.bars if kept_bar.name != bar_name)
     return replace(reduced_scene, vehicle=replace(reduced_scene.vehicle, bars=bars))
 
@@ -147,10 +149,12 @@ def rigid_bushing_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
 
 
 def _stiffness(spring: SpringDamper) -> float:
+    """Stiffness (N/m) of a spring at rest."""
     return slopes_at_rest(spring)[0]
 
 
 def _rigid_bushings(springs: list[SpringDamper]) -> OmissibleEffect:
+    """Returns the effect that makes some bushings rigid."""
     names = [spring.name for spring in springs]
     names_text = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
     bodies = {body for spring in springs for body in (spring.first_body, spring.second_body)}

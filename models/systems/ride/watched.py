@@ -64,6 +64,7 @@ def watched_vehicle(linear_vehicle: LinearVehicle, vehicle: SpatialVehicle, spee
 
 
 def _slip_outputs(vehicle: SpatialVehicle, outputs: tuple[Output, ...], speed: float) -> Iterator[Output]:
+    """Yields the slip angle (rad) at a speed (m/s) of every tyre with a side force, as an output."""
     named = {row.name: row for row in outputs}
     for force in vehicle.side_forces:
         side, roll, yaw = (named[f"{quantity_name} {force.name}"] for quantity_name in ("side velocity", "roll", "yaw"))

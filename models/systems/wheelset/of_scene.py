@@ -79,6 +79,9 @@ def equations_of(scene: WheelsetScene, engine: str, speed: float) -> Equations:
 def _initial_state(
     engine: str, wheelset: Wheelset, speed: float, creep_law: Any, cell_count: int, lateral_shift: float, yaw: float
 ) -> tuple[Equations, np.ndarray]:
+    """Equations of motion in an engine, and the state (10,) at rest on the rails with a lateral displacement (m) and a
+    yaw (rad).
+    """
     equations = equations_class(engine)(wheelset, speed, creep_law, cell_count)
     state = equations.displaced_state(lateral_shift)
     state[YAW] = yaw

@@ -239,6 +239,7 @@ def _cycle_reached_at_speed(scene: WheelsetScene, speed: float) -> Orbit | None:
 
 
 def _attained_in_engine(scene: WheelsetScene, speed: float) -> Orbit | None:
+    """Returns the limit cycle that a motion in the reference reaches at a speed (m/s), or None where it dies out."""
     return attained_cycle(
         equations_of(scene, "reference", speed), start_displacement=scene.run.displacement, step=scene.run.step
     )
