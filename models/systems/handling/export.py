@@ -12,7 +12,7 @@ def exported(scene: HandlingScene, engine: str) -> Exported:
     """Export the vehicle of the first manoeuvre, without springs, tyres and driver, as a model file of "mujoco" or
     "exudyn".
     """
-    handling = scene.car(next(iter(scene.manoeuvres)))
+    handling = scene.model_with_scene_controls(next(iter(scene.manoeuvres)))
     return export_handling(
         engine, handling, ExportSubject(scene.title, scene.file, AXES_TEXT), ["the driver's steer and torques"]
     )

@@ -90,9 +90,9 @@ class NoisePaths:
         return {name: np.array(column) for name, column in zip(("states", "drift_off", "failed"), columns, strict=True)}
 
     def _saved_part(self, path_outcome: Trajectory | RunFailed) -> tuple[np.ndarray, float, float]:
-        """Returns the states (rows, 8) at the saved steps, NaN after a failure; then the time (s) at which the pitch
-            drifts off, and the
-        time (s) of the failure, NaN without one."""
+        """Returns the states (rows, 8) at the saved steps, NaN after a failure; then the time (s) at which the pitch drifts
+        off, infinite if it never does, and the time (s) of the failure, NaN without one.
+        """
         if isinstance(path_outcome, RunFailed):
             failure_time = 0.0 if path_outcome.time is None else path_outcome.time
             return np.full((len(self.rows), 8), np.nan), failure_time, failure_time
