@@ -43,12 +43,12 @@ class StopEnsemble:
     spread: float
     seed: int
 
-    def __call__(self, stop_numbers: range) -> dict[str, np.ndarray]:
+    def __call__(self, paths: range) -> dict[str, np.ndarray]:
         """Runs the stops with these numbers. Returns SAVED_QUANTITIES and the initial speed (m/s) as arrays
         (len(paths),) by name.
         """
         scene = build(self.table, self.file, Path(self.folder))
-        rows = [self._quantities_of_stop(scene, number) for number in stop_numbers]
+        rows = [self._quantities_of_stop(scene, number) for number in paths]
         kept_keys = {**SAVED_QUANTITIES, "speed": "initial speed [m/s]"}
         return {name: np.array([row[key] for row in rows]) for name, key in kept_keys.items()}
 

@@ -79,19 +79,19 @@ class NoisePaths:
             except Exception as error:
                 raise PathFailed(path, f"{type(error).__name__}: {error}") from error
 
-    def __call__(self, path_numbers: range) -> Arrays:
+    def __call__(self, paths: range) -> Arrays:
         """Runs a block of n paths. Returns arrays by name.
 
         ``states`` (n, rows, 8); ``drift_off`` (n,): first time (s) at which the pitch is further than ``threshold``
         from the truth, infinite if never; ``failed`` (n,): last good time (s) of a path that left all bounds, whose
         states are then NaN and whose drift-off is at the latest that time; NaN for all others.
         """
-        columns = zip(*map(self._saved_part, self.trajectories(path_numbers)), strict=True)
+        columns = zip(*map(self._saved_part, self.trajectories(paths)), strict=True)
         return {name: np.array(column) for name, column in zip(("states", "drift_off", "failed"), columns, strict=True)}
 
     def _saved_part(self, path_outcome: Trajectory | RunFailed) -> tuple[np.ndarray, float, float]:
-        """Returns the states (rows, 8) at the saved steps, NaN after a failure; then the time (s) at which the pitch drifts
-        off, infinite if it never does, and the time (s) of the failure, NaN without one.
+        """Returns the states (rows, 8) at the saved steps, NaN after a failure; then the time (s) at which the pitch
+        drifts off, infinite if it never does, and the time (s) of the failure, NaN without one.
         """
         if isinstance(path_outcome, RunFailed):
             failure_time = 0.0 if path_outcome.time is None else path_outcome.time
