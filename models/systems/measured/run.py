@@ -370,16 +370,16 @@ def _make_runs(
             recording_analysis.runs[name] = recording_analysis.march(
                 name, work_folder / name, progress_of_run, estimate_error
             )
-        except RunFailed:
-            recording_analysis.failed[name] = str(estimate_error)
-            if isinstance(estimate_error.partial, SectionOutcome):
-                recording_analysis.runs[name] = estimate_error.partial
-        except InputError:  # what the filter refuses, the findings may explain
+        except RunFailed as failure:
+            recording_analysis.failed[name] = str(failure)
+            if isinstance(failure.partial, SectionOutcome):
+                recording_analysis.runs[name] = failure.partial
+        except InputError as failure:  # what the filter refuses, the findings may explain
             if recording_analysis.rig.vehicle is None or all(
                 finding.weight == "note" for finding in recording_analysis.findings
             ):
                 raise
-            recording_analysis.failed[name] = str(estimate_error)
+            recording_analysis.failed[name] = str(failure)
 
 
 def _with_time_left(
