@@ -109,7 +109,7 @@ def _largest_pitch_error(
     free = free_runs.runs[setting.disturbed]
     damping = 2 * setting.damping * math.sqrt(stiffness * rigid_pitch(free_runs.runs[False].parameters).total_inertia)
     held_assembly = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
-    return float(np.abs(simulate(free.scene, engine, vehicle_assembly=held_assembly)["pitch"] - free_runs.pitch).max())
+    return float(np.abs(simulate(free.scene, engine, assembly=held_assembly)["pitch"] - free_runs.pitch).max())
 
 
 def _limit_rows(setting: SpringSetting, free_runs: FreeRuns, engine: str) -> list[Row]:

@@ -116,7 +116,7 @@ def run(
     error: bool = True,
     fields: bool = False,
     answers: Path | None = None,
-    report_progress: Progress = lambda stage, share: None,
+    progress: Progress = lambda stage, share: None,
 ) -> Result:
     """Compute the creep forces of a scene at every creepage, with ``ContactResults`` as detail, or those of its table
     of cases.
@@ -130,15 +130,15 @@ def run(
     if scene.cases is not None:
         if answers is None:
             raise InputError(scene.file, "cases", None, "is a table of contacts, which is answered into a file")
-        return _table_result(scene, answers, report_progress, error)
+        return _table_result(scene, answers, progress, error)
     motions, cells = swept_creepages(scene), scene.method.cells
-    report_progress("loading", 0.0)
+    progress("loading", 0.0)
     shown = rolled(solved_contact(scene), motions[-1], cells, fields=True) if fields else None
     begun, start = time.process_time(), time.perf_counter()
     contact = solved_contact(scene)
     steps, marks = list[tuple[Rolled, Error | None]](), [time.perf_counter()]
     for i, motion in enumerate(motions):
-        report_progress("rolling", i / len(motions))
+        progress("rolling", i / len(motions))
         steps.append(rolled(contact, motion, cells) if error else (contact.roll(motion, cells), None))
         marks.append(time.perf_counter())
     seconds = time.process_time() - begun

@@ -175,7 +175,7 @@ def run(
     scene: MeasuredScene,
     engine: str = "",
     folder: Path | None = None,
-    report_progress: Progress = no_progress,
+    progress: Progress = no_progress,
     whole_run: bool = False,
     error: bool = False,
 ) -> Result:
@@ -188,10 +188,10 @@ def run(
     """
     temporary = None if folder else TemporaryDirectory()
     folder = folder or Path(temporary.name if temporary else "")
-    exam = _start_examination(scene, engine or scene.run.engine, folder, report_progress, error)
+    exam = _start_examination(scene, engine or scene.run.engine, folder, progress, error)
     exam.temporary_folder = temporary
     if whole_run:
-        _examine(exam, folder, report_progress, error)
+        _examine(exam, folder, progress, error)
     else:
         begun = time.process_time()
         exam.runs[exam.chosen_run] = exam.march(

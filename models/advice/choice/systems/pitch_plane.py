@@ -16,7 +16,7 @@ def computed_quantities(scene: Scene, engine: str, error: bool = False) -> RunQu
     """Run the pitch-plane scene and collect the channels of its result."""
     assembly = assembly_of_scene(scene)
     start_time = time.process_time()
-    result = run(scene, engine, vehicle_assembly=assembly, error=error)
+    result = run(scene, engine, assembly=assembly, error=error)
     seconds = time.process_time() - start_time
     run_counts, states = result.counts(), result.detail.states
     counts = {"steps": run_counts.get("steps", len(states) - 1), "states": states.shape[1]}
