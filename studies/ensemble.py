@@ -29,7 +29,7 @@ from models.ensemble.runner import EnsembleProgress as Done
 from models.ensemble.workers import Crew
 from models.systems.pitch_plane.assumptions import upright_assumption
 from models.systems.pitch_plane.noise_paths import largest_difference, mujoco_threads, noise_paths
-from models.systems.pitch_plane.path_statistics import PITCH_STATE, PathStatistics
+from models.systems.pitch_plane.path_statistics import PITCH_STATE_INDEX, PathStatistics
 from models.systems.pitch_plane.run import run_with_drift
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.virtual_measurement import check_road, follower_builder, measure, write_measurement
@@ -204,7 +204,9 @@ def _deviation_rows(
     names, rows = ("time", "pitch", "pitch error", "heave", "heave error"), []
     for time in study_options.times:
         row = round(time / study_options.rows)
-        pitch, heave = (path_statistics.moments.deviation(row, state) for state in (PITCH_STATE, HEAVE_STATE_INDEX))
+        pitch, heave = (
+            path_statistics.moments.deviation(row, state) for state in (PITCH_STATE_INDEX, HEAVE_STATE_INDEX)
+        )
         figures = (float(times[row]), *pitch, *heave)
         rows.append(dict(zip(names, figures, strict=True)))
     return rows

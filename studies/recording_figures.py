@@ -25,7 +25,7 @@ from models.fatigue.counting import CountedLoad
 from models.measured.checks.agreement import MeasurementFault, SignalGroup
 from models.measured.checks.evidence import CheckedRecording
 from models.measured.signal import UNIT_OF_QUANTITY, MeasuredSignal
-from models.systems.measured.holds import FREE_RUN
+from models.systems.measured.holds import FREE_RUN_NAME
 from models.systems.measured.run import RecordingAnalysis
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.sections import SectionChannel
@@ -44,7 +44,7 @@ LOUD_COLOUR, QUIET_COLOUR, MARK_COLOUR = VERMILION, TRUTH_COLOUR, YELLOW
 RUN_STYLES = {
     "measured": ("measured", MEASURED_COLOUR),
     "truth": ("truth", TRUTH_COLOUR),
-    FREE_RUN: ("free run", LOUD_COLOUR),
+    FREE_RUN_NAME: ("free run", LOUD_COLOUR),
     "kalman": ("held by the Kalman filter", BLUE),
     "prescribed": ("held to the measured angles", BLUE),
 }
@@ -305,7 +305,7 @@ def drift_figure(examined_recording: RecordingAnalysis, figure_path: Path) -> Pa
             panel.plot(*thinned_curve(times_of_run, np.degrees(values)), color=colour, label=label, lw=1.0)
         if (
             examined_recording.drift is not None
-            and examined_recording.chosen_run != FREE_RUN
+            and examined_recording.chosen_run != FREE_RUN_NAME
             and examined_recording.chosen_run in curves
         ):
             chosen_angles = np.interp(examined_recording.drift.times, *curves[examined_recording.chosen_run])

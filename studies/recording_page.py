@@ -16,7 +16,7 @@ from models.core.whole_files import write_whole
 from models.drawing.pages import environment_of
 from models.fatigue.damage import WOEHLER_SLOPE
 from models.systems.measured.consequences import DAMAGE_LIMITS, FORCE_LIMITS
-from models.systems.measured.holds import FREE_RUN
+from models.systems.measured.holds import FREE_RUN_NAME
 from models.systems.measured.run import RecordingAnalysis
 from models.systems.measured.section_run import SectionOutcome
 from models.systems.measured.verdict import LARGEST_DISAGREEMENT, errors_of_run
@@ -24,7 +24,7 @@ from studies import recording_figures as draw
 
 PAGE_TEMPLATE = "recording.html.jinja"
 RUN_NAMES = {
-    FREE_RUN: "Free run",
+    FREE_RUN_NAME: "Free run",
     "kalman": "Run held by the Kalman filter",
     "prescribed": "Run held to measured angles",
 }
@@ -54,7 +54,7 @@ def page_text(examined_recording: RecordingAnalysis, output_folder: Path, saved_
         errors=error_lines(saved_result),
         breaches=[breach.line() for breach in broken_of(saved_result)],
         assumed=assumption_sentences(saved_result),
-        free=FREE_RUN,
+        free=FREE_RUN_NAME,
         weights=[finding.weight for finding in examined_recording.findings],
         used=[(signal, examined_recording.is_input(signal)) for signal in examined_recording.recording.signals],
         effects={

@@ -82,7 +82,7 @@ def test_results_have_the_clock_of_the_file():
 )
 def test_bad_input_is_named(changes: dict, told: str):
     with pytest.raises(InputError, match=told):
-        scene(**changes).car("measured")
+        scene(**changes).model_with_scene_controls("measured")
 
 
 def test_manoeuvre_without_speed_is_refused():

@@ -178,7 +178,7 @@ def _drift_by_model_error(
 def _drift_off_time(assembly: Assembly, true_run: Result) -> float:
     """First time (s) at which the run's pitch differs from the true pitch by UNTRUSTED_PITCH; infinite if it never
     does."""
-    run = simulate(assembly.scene, "reference", vehicle_assembly=assembly)
+    run = simulate(assembly.scene, "reference", assembly=assembly)
     time = GrowthCurve(run.times, np.abs(run["pitch"] - true_run["pitch"])).passing_time()
     return np.inf if time is None else time
 

@@ -133,7 +133,7 @@ def _largest_pitch_error(
     held_assembly = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
     return float(
         np.abs(
-            simulate(free.scene, engine_name, vehicle_assembly=held_assembly)["pitch"] - runs_without_spring.true_pitch
+            simulate(free.scene, engine_name, assembly=held_assembly)["pitch"] - runs_without_spring.true_pitch
         ).max()
     )
 

@@ -26,7 +26,7 @@ import numpy as np
 from models.advice.ride_choice.candidates import Candidates, EffectSet, cached_in_object
 from models.advice.ride_choice.march import Cost
 from models.advice.ride_choice.marched import confirms_step
-from models.systems.ride.omissions import TYRE_DAMPING
+from models.systems.ride.omissions import TYRE_DAMPING_EFFECT
 from models.systems.ride.reduced_scene import OmissibleEffect, refusal_reason
 
 MOST_CONFIRMATIONS = 30
@@ -293,7 +293,7 @@ class Chooser(Candidates):
         """The smallest sets that can be left out. A set that lets white noise reach a quantity is also tried together
         with the tyres' damping, through which this noise enters.
         """
-        damping = frozenset(effect for effect in self.effects if effect.name == TYRE_DAMPING)
+        damping = frozenset(effect for effect in self.effects if effect.name == TYRE_DAMPING_EFFECT)
         white = [
             step for step in self.sets_to_search if damping and not np.isfinite(self.predicted_changes(step)).all()
         ]

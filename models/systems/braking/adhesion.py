@@ -33,7 +33,7 @@ from models.systems.braking.scene import BrakingProcedure, BrakingRoadTable, Bra
 from models.systems.braking.stop_report import StopHistory
 
 AXLE_NAMES_IN_ERRORS = ("front axle", "rear axle", "trailer's front axle", "trailer's rear axle")
-PRESSURE_HALVINGS = 9
+PRESSURE_BISECTION_COUNT = 9
 """Halvings of the interval that contains the pressure at which an axle locks, to 1/500 of the supply pressure."""
 LONGEST_RUN_DURATION = 120.0
 """Longest duration (s) of a run that measures adhesion, in place of the scene's duration."""
@@ -147,7 +147,7 @@ def _single_axle_braking_rate(scene: BrakingScene, vehicle: BrakedVehicle, axle_
     low, high = 0.0, scene.brakes.supply
     if not _wheel_locks(run(high)):
         raise NoAdhesion(f"the {AXLE_NAMES_IN_ERRORS[axle_index]} does not lock at the supply's {high:g} bar")
-    for _ in range(PRESSURE_HALVINGS):
+    for _ in range(PRESSURE_BISECTION_COUNT):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if _wheel_locks(run(middle)) else (middle, high)
     braking_times = [_slowing_time(run(share * low), 40.0, 20.0) for share in PRESSURE_SHARES_BELOW_LOCK]

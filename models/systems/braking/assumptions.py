@@ -18,7 +18,7 @@ from models.systems.braking.of_scene import measured_pressures_of, tyre_tables_o
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import HITCH_SUFFIX, SLOWEST_SLIP_SPEED, StopHistory, wheel_names
 
-WITHOUT_VALVES = ("none", "slip_pi")
+CONTROLLERS_WITHOUT_VALVES = ("none", "slip_pi")
 """Controllers that never switch valves on and off."""
 LEAST_WHEEL_LOAD = 1.0
 """Wheel load (N) below which a wheel has left the road."""
@@ -118,6 +118,9 @@ def _transferred_load(scene: BrakingScene, run_result: Result) -> Watched:
 
 
 def _load_transfer_of_body(body: Truck, acceleration_along: np.ndarray, acceleration_across: np.ndarray) -> np.ndarray:
+    """Load transfer divided by load at rest, (n,), of a body's lighter axle and narrower track, by accelerations in
+    m/s^2.
+    """
     lever = max(1.0 / body.front.x, -1.0 / body.rear.x)  # of the axle that bears less
     track = min(body.front.track, body.rear.track)
     return body.height / GRAVITY * (acceleration_along * lever + 2.0 * acceleration_across / track)
@@ -184,11 +187,13 @@ def _has_spring_without_stops(vehicle: BrakedVehicle) -> bool:
 
 
 def _hinge_angles(run_result: Result) -> Watched:
+    """Angles (n,) in rad of the drawbar against the truck and of the trailer against the drawbar, by name."""
     bends = np.diff(run_result.detail.states[:, 0, 2:], axis=1)
     return dict(zip(("drawbar against the truck", "trailer against the drawbar"), bends.T, strict=True))
 
 
 def _hitch_angles(run_result: Result) -> Watched:
+    """Angles (n,) in rad at every hitch of a suspended vehicle with what it tows, by the name of the towed body."""
     columns = {name: i for i, name in enumerate(run_result.detail.coordinates) if name.endswith(HITCH_SUFFIX)}
     return {name.removesuffix(HITCH_SUFFIX): run_result.detail.states[:, 0, i] for name, i in columns.items()}
 
@@ -211,6 +216,7 @@ def _share_lifted_by_hook(scene: BrakingScene, run_result: Result) -> Watched:
 
 
 def _lean_angles(run_result: Result) -> Watched:
+    """Roll and pitch (n,) in rad of a vehicle on its suspension, by name."""
     lean = StopHistory(run_result.detail).lean
     assert lean is not None
     return dict(zip(("roll", "pitch"), lean.T, strict=True))
@@ -267,7 +273,7 @@ def _resolved_speed(vehicle: BrakedVehicle, run_result: Result) -> Watched:
 
 def _brake_assumptions(scene: BrakingScene, procedure_name: str, vehicle: BrakedVehicle) -> Iterator[Assumption]:
     """Yields assumptions on brake pressures, brake work and the valves that set the pressures."""
-    port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in WITHOUT_VALVES
+    port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in CONTROLLERS_WITHOUT_VALVES
     if sets_valves and scene.pressure is None:
         yield Assumption(
             "chambers",
@@ -352,6 +358,7 @@ def _drive_assumptions(scene: BrakingScene, vehicle: BrakedVehicle) -> Iterator[
 
 
 def _steer_angles(vehicle: BrakedVehicle, run_result: Result) -> Watched:
+    """Steer angles in rad of the front wheels: a fixed angle (1,), or over time (n,)."""
     if vehicle.steering is None:
         return {"front wheels": np.full(1, vehicle.steer[0])}
     return {"front wheels": np.array([vehicle.steering(float(time))[0] for time in run_result.times])}

@@ -264,8 +264,8 @@ def _columns_at(times: np.ndarray, braking_path: BrakingPath, sampled_columns: n
 
 
 def _size_of_channel(channel_name: str, channel_values: np.ndarray, run_share: float = 1.0) -> float:
-    """Size of a channel by which its error is divided, at least LEAST_SIZES; ``run_share`` is the share of the run that
-    the values cover.
+    """Size of a channel by which its error is divided, at least LEAST_CHANNEL_SIZES; ``run_share`` is the share of the
+    run that the values cover.
     """
     return max(reference_size(channel_values), run_share * LEAST_CHANNEL_SIZES.get(channel_name, 0.0))
 
@@ -282,4 +282,5 @@ def _estimate_of_channel(
 
 
 def _rms(values: np.ndarray) -> float:
+    """Root mean square of values."""
     return float(np.sqrt(np.mean(np.square(values))))

@@ -4,7 +4,7 @@ from models.core.errors import InputError
 from models.engines.export import Exported, ExportSubject
 from models.systems.braking.of_scene import sprung_of
 from models.systems.braking.scene import BrakingScene
-from models.systems.handling.export import AXES, export_handling
+from models.systems.handling.export import AXES_TEXT, export_handling
 
 
 def exported(scene: BrakingScene, engine: str) -> Exported:
@@ -15,4 +15,6 @@ def exported(scene: BrakingScene, engine: str) -> Exported:
         allowed = "is in the plane, by equations of twinrig's: give vehicle.file, a vehicle on its suspension"
         raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)
     omissions = ["spin of the wheels, brakes and controller"]
-    return export_handling(engine, sprung_of(scene).handling, ExportSubject(scene.title, scene.file, AXES), omissions)
+    return export_handling(
+        engine, sprung_of(scene).handling, ExportSubject(scene.title, scene.file, AXES_TEXT), omissions
+    )

@@ -21,7 +21,7 @@ from models.systems.braking.scene import BrakingProcedure, BrakingScene
 
 UNBRAKED_DURATION = 4.0
 """Time (s) after the last steering knot over which the yaw response without brakes is computed."""
-STEERED_WHEELS = 2
+STEERED_WHEEL_COUNT = 2
 """Number of steered wheels: the wheels of the first axle, in parallel."""
 ACCELERATION_INTERVAL = 1e-5
 """Time step (s) over which the accelerations of a steady turn are computed."""
@@ -31,7 +31,7 @@ solved at once may slide beyond the tyres' peak.
 """
 LARGEST_TURN_ANGLE = 0.5
 """Largest steer angle, side slip and hinge angle (rad) of a steady turn that is accepted."""
-STEADY_ACCELERATION = 1e-6
+LARGEST_STEADY_ACCELERATION = 1e-6
 """Largest residual acceleration (m/s^2 and rad/s^2) of a steady turn."""
 
 
@@ -148,7 +148,7 @@ def port_run_of(scene: BrakingScene, procedure_name: str, vehicle: BrakedVehicle
 
 def steer_angles(vehicle: BrakedVehicle, front_angle: float) -> np.ndarray:
     """Steer angles (W,) of all wheels with the front wheels at an angle (rad), the other wheels straight."""
-    return np.where(np.arange(vehicle.plane.wheels) < STEERED_WHEELS, front_angle, 0.0)
+    return np.where(np.arange(vehicle.plane.wheels) < STEERED_WHEEL_COUNT, front_angle, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +209,7 @@ class CircleMotion:
         from scipy.optimize import root
 
         unknown: np.ndarray = root(self.residual_accelerations, unknowns_guess, tol=1e-12).x
-        return unknown, bool(np.abs(self.residual_accelerations(unknown)).max() <= STEADY_ACCELERATION)
+        return unknown, bool(np.abs(self.residual_accelerations(unknown)).max() <= LARGEST_STEADY_ACCELERATION)
 
     def steady_turn(self, unknowns: np.ndarray) -> SteadyCircle:
         """Returns the steady turn for given unknowns, with which a procedure begins."""

@@ -209,16 +209,16 @@ KEYS_OF_PROCEDURE = {"straight": (), "split": ("right",), "turn": ("radius",), "
 """Keys that each kind of procedure has besides its speed; exactly one of them is needed."""
 LARGEST_STEER_ANGLE = 1.0
 """Largest steer angle (rad) of the front wheels in a scene."""
-Refusals = Iterator[tuple[str, Any, str]]
+BrakingRefusals = Iterator[tuple[str, Any, str]]
 """Wrong keys of a scene, their values, and what is allowed there."""
 
 
-def _procedure_refusals(scene: BrakingScene) -> Refusals:
+def _procedure_refusals(scene: BrakingScene) -> BrakingRefusals:
     for name, procedure in scene.procedures.items():
         yield from ((f"procedures.{name}.{key}", *wrong) for key, *wrong in _refusals_of_procedure(procedure))
 
 
-def _refusals_of_procedure(procedure: BrakingProcedure) -> Refusals:
+def _refusals_of_procedure(procedure: BrakingProcedure) -> BrakingRefusals:
     if procedure.speed > LARGEST_SPEED:
         yield "speed", procedure.speed, f"must be at most {LARGEST_SPEED:g} m/s"
     read = KEYS_OF_PROCEDURE[procedure.kind]
@@ -242,7 +242,7 @@ def _refusals_of_procedure(procedure: BrakingProcedure) -> Refusals:
         yield "radius", procedure.radius, "must be at least 10 m, of either sign"
 
 
-def _vehicle_refusals(scene: BrakingScene) -> Refusals:
+def _vehicle_refusals(scene: BrakingScene) -> BrakingRefusals:
     """Yields refusals of [vehicle] keys that repeat what vehicle.file defines, and of keys that have no meaning without
     this file.
     """
@@ -260,7 +260,7 @@ def _vehicle_refusals(scene: BrakingScene) -> Refusals:
             yield f"vehicle.{key}", None, "has no meaning beside vehicle.file, which says it all"
 
 
-def _brake_refusals(scene: BrakingScene) -> Refusals:
+def _brake_refusals(scene: BrakingScene) -> BrakingRefusals:
     """Yields refusals of a supply pressure that no vehicle has, and of torques that no brake gives."""
     supply = scene.brakes.supply
     if supply > LARGEST_PRESSURE:
@@ -274,7 +274,7 @@ def _brake_refusals(scene: BrakingScene) -> Refusals:
             yield f"brakes.{axle}.{key}", value, torque_limit
 
 
-def _run_refusals(scene: BrakingScene) -> Refusals:
+def _run_refusals(scene: BrakingScene) -> BrakingRefusals:
     run, pressure = scene.run, scene.pressure
     if not 1e-4 <= run.sample <= 0.1:
         yield "run.sample", run.sample, "must be from 0.0001 to 0.1 s"

@@ -43,12 +43,12 @@ class StopEnsemble:
     spread: float
     seed: int
 
-    def __call__(self, stop_numbers: range) -> dict[str, np.ndarray]:
-        """Runs the stops with these numbers. Returns KEPT_QUANTITIES and the initial speed (m/s) as arrays
+    def __call__(self, paths: range) -> dict[str, np.ndarray]:
+        """Runs the stops with these numbers. Returns SAVED_QUANTITIES and the initial speed (m/s) as arrays
         (len(paths),) by name.
         """
         scene = build(self.table, self.file, Path(self.folder))
-        rows = [self._quantities_of_stop(scene, number) for number in stop_numbers]
+        rows = [self._quantities_of_stop(scene, number) for number in paths]
         kept_keys = {**SAVED_QUANTITIES, "speed": "initial speed [m/s]"}
         return {name: np.array([row[key] for row in rows]) for name, key in kept_keys.items()}
 
@@ -96,7 +96,7 @@ def scatter_of(sample_values: np.ndarray) -> SampleScatter:
 
 def statistical_errors(scatters: Mapping[str, SampleScatter]) -> dict[str, Estimate]:
     """Statistical errors of the means of an ensemble, by quantity. Relative errors refer to the mean, or to
-    COURSE_SIZES where the mean is smaller.
+    COURSE_REFERENCE_SIZES where the mean is smaller.
     """
     units = {key: label.partition("[")[2][:-1] for key, label in SAVED_QUANTITIES.items()}
     return {

@@ -274,5 +274,6 @@ def first_rows(output_path: Path) -> dict[str, tuple[str, np.ndarray]]:
 
 
 def _name_and_unit(heading: str) -> tuple[str, str]:
+    """Name and unit of a column with the heading "name [unit]"."""
     name, _, unit = heading.rstrip("]").partition(" [")
     return name, unit

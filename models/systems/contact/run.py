@@ -45,8 +45,8 @@ from models.systems.contact.scene import ContactScene, scene_errors
 from models.systems.contact.stated_error import with_error, with_error_of_rows
 
 BUILT_IN_PROFILES = {"wheel": BUILT_IN_WHEELS, "rail": BUILT_IN_RAILS}
-FORCES_OF_ROLLED = attrgetter("fx", "fy", "mz", "stick", "dissipation")
-ERRORS_OF_ROLLED = attrgetter("cells", "theory", "moment_cells", "moment_theory")
+FORCES_OF_ROLLED_CONTACT = attrgetter("fx", "fy", "mz", "stick", "dissipation")
+ERRORS_OF_ROLLED_CONTACT = attrgetter("cells", "theory", "moment_cells", "moment_theory")
 CONTACT_CHANNELS = {
     "xi_x": ("-", "longitudinal creepage"),
     "xi_y": ("-", "lateral creepage"),
@@ -61,8 +61,8 @@ CONTACT_CHANNELS = {
     "moment_error_of_cells": ("N m", "error of the moment that the cells leave"),
     "moment_error_of_theory": ("N m", "error of the moment that the theory has"),
 }
-"""Units and meanings of a motion, of its forces (``FORCES_OF_ROLLED``) and of their errors (``ERRORS_OF_ROLLED``), in
-this order.
+"""Units and meanings of a motion, of its forces (``FORCES_OF_ROLLED_CONTACT``) and of their errors
+(``ERRORS_OF_ROLLED_CONTACT``), in this order.
 """
 FIELD_UNITS = {"x": "m", "y": "m", "dx": "m", "dy": "m", "pressure": "Pa", "px": "Pa", "py": "Pa", "slips": "-"}
 ERROR_ORDER_OF_CELLS = {"linear": None, "fastsim": 2, "simplified": 2, "exact": 4}
@@ -116,7 +116,7 @@ def run(
     error: bool = True,
     fields: bool = False,
     answers: Path | None = None,
-    report_progress: Progress = lambda stage, share: None,
+    progress: Progress = lambda stage, share: None,
 ) -> Result:
     """Compute the creep forces of a scene at every creepage, with ``ContactResults`` as detail, or those of its table
     of cases.
@@ -130,15 +130,15 @@ def run(
     if scene.cases is not None:
         if answers is None:
             raise InputError(scene.file, "cases", None, "is a table of contacts, which is answered into a file")
-        return _table_result(scene, answers, report_progress, error)
+        return _table_result(scene, answers, progress, error)
     motions, cells = swept_creepages(scene), scene.method.cells
-    report_progress("loading", 0.0)
+    progress("loading", 0.0)
     shown = rolled_with_errors(solved_contact(scene), motions[-1], cells, with_fields=True) if fields else None
     begun, start = time.process_time(), time.perf_counter()
     contact = solved_contact(scene)
     steps, marks = list[tuple[RollingResult, ContactErrors | None]](), [time.perf_counter()]
     for i, motion in enumerate(motions):
-        report_progress("rolling", i / len(motions))
+        progress("rolling", i / len(motions))
         steps.append(rolled_with_errors(contact, motion, cells) if error else (contact.roll(motion, cells), None))
         marks.append(time.perf_counter())
     seconds = time.process_time() - begun
@@ -158,8 +158,10 @@ def _labelled_result(scene: ContactScene, contact_results: ContactResults, run_s
         len(contact_results.motions),
         ERROR_ORDER_OF_CELLS[scene.method.name],
     )
-    errors: list[tuple[float, ...]] = [ERRORS_OF_ROLLED(error) for error in contact_results.errors] or [()] * count
-    rows = zip(contact_results.motions, map(FORCES_OF_ROLLED, contact_results.rolled), errors, strict=True)
+    errors: list[tuple[float, ...]] = [ERRORS_OF_ROLLED_CONTACT(error) for error in contact_results.errors] or [
+        ()
+    ] * count
+    rows = zip(contact_results.motions, map(FORCES_OF_ROLLED_CONTACT, contact_results.rolled), errors, strict=True)
     columns = np.array([[*motion, *forces, *errors_of_forces] for motion, forces, errors_of_forces in rows]).T
     doubt = ""
     if isinstance(contact, LinearTheory):
@@ -248,6 +250,7 @@ def _line_count(text_path: Path) -> int:
 
 
 def _count_rows(report_progress: Progress, total_rows: int, finished_rows: int) -> None:
+    """Report how many rows of all are finished."""
     report_progress(f"{finished_rows:,} of {total_rows:,} rows", min(finished_rows / max(total_rows, 1), 1.0))
 
 

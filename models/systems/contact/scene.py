@@ -213,16 +213,16 @@ def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: P
     return complete
 
 
-Refusals = Iterator[tuple[str, Any, str]]
+ContactRefusals = Iterator[tuple[str, Any, str]]
 """Wrong keys of a scene, their values and what is allowed there; the first of them is reported."""
 
 
-def _raise_first_refusal(scene: ContactScene, *refusal_checks: Callable[[ContactScene], Refusals]) -> None:
+def _raise_first_refusal(scene: ContactScene, *refusal_checks: Callable[[ContactScene], ContactRefusals]) -> None:
     for key_path, value, allowed in chain.from_iterable(wrong(scene) for wrong in refusal_checks):
         raise InputError(scene.file, key_path, value, allowed)
 
 
-def _geometry_refusals(scene: ContactScene) -> Refusals:
+def _geometry_refusals(scene: ContactScene) -> ContactRefusals:
     """Yields refusals of a scene with several geometry tables or none, of impossible radii, and of profile values out
     of range, as of a wheel in mm.
     """
@@ -263,7 +263,7 @@ LARGEST_INPUTS = {
 """Largest magnitudes of inputs that the theories take, by scene key."""
 
 
-def _contact_refusals(scene: ContactScene) -> Refusals:
+def _contact_refusals(scene: ContactScene) -> ContactRefusals:
     contact = scene.contact
     if scene.cases is not None:
         for table in sorted(scene.model_fields_set & TABLES_IN_CASES_FILE):
@@ -274,7 +274,7 @@ def _contact_refusals(scene: ContactScene) -> Refusals:
         yield "contact.load", contact.load, "give either the load in N or contact.approach in m"
 
 
-def _size_refusals(scene: ContactScene) -> Refusals:
+def _size_refusals(scene: ContactScene) -> ContactRefusals:
     """Yields refusals of values beyond LARGEST_INPUTS. The theories would refuse them, too, without the name of file
     and key.
     """
@@ -289,7 +289,7 @@ def _size_refusals(scene: ContactScene) -> Refusals:
                 yield value_path, value, f"must be at most {largest:g}{unit}, of either sign"
 
 
-def _sweep_refusals(scene: ContactScene) -> Refusals:
+def _sweep_refusals(scene: ContactScene) -> ContactRefusals:
     if (sweep := scene.sweep) is None:
         return
     if sweep.start == sweep.stop:
@@ -305,7 +305,7 @@ THEORIES_OF_PROFILES = ("simplified", "exact")
 """Theories that compute contact areas of any shape, as profiles need."""
 
 
-def _method_refusals(scene: ContactScene) -> Refusals:
+def _method_refusals(scene: ContactScene) -> ContactRefusals:
     """Yields refusals of [method] keys that the theory does not read, and of a theory that does not suit the
     geometry.
     """
@@ -318,7 +318,7 @@ def _method_refusals(scene: ContactScene) -> Refusals:
         yield "method.name", method.name, "needs an ellipse; for profiles use " + " or ".join(THEORIES_OF_PROFILES)
 
 
-def _friction_refusals(scene: ContactScene) -> Refusals:
+def _friction_refusals(scene: ContactScene) -> ContactRefusals:
     """Yields refusals of falling friction in a table of cases, and with a FASTSIM march that is not of second order."""
     march = scene.method.march
     if scene.falling_friction is None:

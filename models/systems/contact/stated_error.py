@@ -18,7 +18,7 @@ from models.core.result import Result
 from models.systems.contact.scene import ContactScene
 
 LARGEST_CELL_COUNT = 400
-HALVED_CELLS = "half the cells along each axis"
+HALVED_CELLS_TEXT = "half the cells along each axis"
 BAND_TEXT = "which 95 % of such contacts keep to"
 
 
@@ -41,7 +41,7 @@ def with_error(
     if isinstance(rolling_contact, LinearTheory):
         not_estimated(run_result, "the linear theory has no cells")
     else:
-        with_stated_errors(run_result, estimates, HALVED_CELLS)
+        with_stated_errors(run_result, estimates, HALVED_CELLS_TEXT)
     theory = finite_rms(run_result["error_of_theory"])
     return (
         with_theory_error(run_result, {"force": _theory_estimate(theory, force)}, BAND_TEXT)
@@ -59,7 +59,7 @@ def with_error_of_rows(table_result: Result, scene: ContactScene) -> Result:
     with_stated_errors(
         table_result,
         {"force": grid_error(finite_rms(table_result["error_of_cells"]), force, "N", cells, order, LARGEST_CELL_COUNT)},
-        HALVED_CELLS,
+        HALVED_CELLS_TEXT,
     )
     return with_theory_error(
         table_result, {"force": _theory_estimate(finite_rms(table_result["error_of_theory"]), force)}, BAND_TEXT

@@ -155,6 +155,8 @@ class TheorySettings:
 
 
 def _fastsim(**fastsim_choices: Any) -> Callable[[ContactCase, int], ForcesOfMotion]:
+    """Returns a function that makes, for a case and a number of cells, the function of the creepages by FASTSIM."""
+
     def rolled(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
         ellipse = FastsimEllipse(
             contact_case.a / contact_case.b, contact_case.pair, cells=cell_count, **fastsim_choices
@@ -165,6 +167,7 @@ def _fastsim(**fastsim_choices: Any) -> Callable[[ContactCase, int], ForcesOfMot
 
 
 def _simplified(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
+    """Returns the function of the creepages that computes the forces of a case by the simplified theory."""
     pressed = interpenetration_contact(
         by_axes(contact_case.a, contact_case.b, contact_case.pair, load=contact_case.load), contact_case.pair
     )

@@ -138,14 +138,17 @@ def _travel_assumptions(handling_model: Handling) -> list[Assumption]:
 
 
 def _watched_coordinate(coordinate_column: int, coordinate_name: str, run_result: Result) -> Watched:
+    """Values (m,) of a coordinate over a run, under the name of the coordinate."""
     return {coordinate_name: run_result["positions"][:, coordinate_column]}
 
 
 def _watched_by_tyre(tyre_values: np.ndarray, handling_model: Handling) -> Watched:
+    """Columns of values (m, w) by the name of the tyre."""
     return {tyre.name: column for tyre, column in zip(handling_model.vehicle.tyres, tyre_values.T, strict=True)}
 
 
 def _static_loads(handling_model: Handling) -> np.ndarray:
+    """Loads (w,) in N of the tyres at rest."""
     return np.array([handling_model.held.tyres[tyre.name] for tyre in handling_model.vehicle.tyres])
 
 

@@ -5,16 +5,16 @@ from models.multibody.numbers import Handling
 from models.systems.handling.run import driven_model
 from models.systems.handling.scene import HandlingScene
 
-AXES = "x forward, y left, z up; the carrier has x, y and yaw, the sway z, roll and pitch; zero is the design."
+AXES_TEXT = "x forward, y left, z up; the carrier has x, y and yaw, the sway z, roll and pitch; zero is the design."
 
 
 def exported(scene: HandlingScene, engine: str) -> Exported:
     """Export the vehicle of the first manoeuvre, without springs, tyres and driver, as a model file of "mujoco" or
     "exudyn".
     """
-    handling = scene.car(next(iter(scene.manoeuvres)))
+    handling = scene.model_with_scene_controls(next(iter(scene.manoeuvres)))
     return export_handling(
-        engine, handling, ExportSubject(scene.title, scene.file, AXES), ["the driver's steer and torques"]
+        engine, handling, ExportSubject(scene.title, scene.file, AXES_TEXT), ["the driver's steer and torques"]
     )
 
 

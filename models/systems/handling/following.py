@@ -25,7 +25,7 @@ LOW_PASS_FREQUENCY = 2.0
 
 
 def controls_following_drive(
-    handling_model: Handling, simulated_drive: MeasuredDrive, time_step: float, measured_path: str
+    handling_model: Handling, measured_drive: MeasuredDrive, time_step: float, measured_path: str
 ) -> Controls:
     """Compute steer angle, brake torque and drive torque over time with which the car follows a measured steer angle
     and speed.
@@ -34,15 +34,15 @@ def controls_following_drive(
     measured_path : name of the scene's file. Raises RunFailed where no torques give the measured speed, as on a road
     without friction.
     """
-    period = float(simulated_drive.times[1] - simulated_drive.times[0])
+    period = float(measured_drive.times[1] - measured_drive.times[0])
     stride = round(period / time_step)
     speed = low_passed(
-        simulated_drive.speed[:, None], period, LOW_PASS_FREQUENCY, measured_path, "manoeuvres.NAME.measured"
+        measured_drive.speed[:, None], period, LOW_PASS_FREQUENCY, measured_path, "manoeuvres.NAME.measured"
     )[:, 0]
     mass, radius = sum(body.mass for body in handling_model.vehicle.bodies), handling_model.vehicle.tyres[0].point[2]
     force, resistance = mass * np.gradient(speed, period), 0.0
     for march in range(LARGEST_ITERATION_COUNT):
-        controls = _with_torque(handling_model.controls, simulated_drive, radius * force)
+        controls = _with_torque(handling_model.controls, measured_drive, radius * force)
         run = drive_run(
             FOLLOWING_ENGINE,
             handling_model.changed(controls=controls),
@@ -64,18 +64,18 @@ def controls_following_drive(
     )
 
 
-def _with_torque(controls: Controls, simulated_drive: MeasuredDrive, wheel_torque: np.ndarray) -> Controls:
+def _with_torque(controls: Controls, measured_drive: MeasuredDrive, wheel_torque: np.ndarray) -> Controls:
     """Returns the controls with the measured steer angle and a torque (n,) in N m of all wheels together, driving above
     0, braking below.
     """
-    knot_times = simulated_drive.times - simulated_drive.times[0]
+    knot_times = measured_drive.times - measured_drive.times[0]
 
     def knots(knot_values: np.ndarray) -> Control:
         return tuple(zip(knot_times.tolist(), knot_values.tolist(), strict=True))
 
     return replace(
         controls,
-        steer=knots(simulated_drive.steer),
+        steer=knots(measured_drive.steer),
         brake=knots(np.maximum(-wheel_torque, 0.0)),
         drive=knots(np.maximum(wheel_torque, 0.0)),
     )

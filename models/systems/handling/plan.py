@@ -16,17 +16,17 @@ from models.vehicles.towing import hitch_line
 def check(scene: HandlingScene, engines: tuple[str, ...]) -> None:
     """Raise InputError, before any file is written, for vehicles, tyres or roads that cannot be built."""
     for name in scene.manoeuvres:
-        scene.car(name)
+        scene.model_with_scene_controls(name)
 
 
 def findings(scene: HandlingScene) -> tuple[Finding, ...]:
     """Returns doubts about implausible parameters of the vehicle, except parameters that the scene accepts."""
-    return plausible(scene.car(next(iter(scene.manoeuvres))).given, scene.vehicle.accept)
+    return plausible(scene.model_with_scene_controls(next(iter(scene.manoeuvres))).given, scene.vehicle.accept)
 
 
 def describe(scene: HandlingScene) -> str:
     """Returns the plan of a handling scene as text: vehicle, tyres, road, manoeuvres, engines, effects, assumptions."""
-    first = scene.car(next(iter(scene.manoeuvres)))
+    first = scene.model_with_scene_controls(next(iter(scene.manoeuvres)))
     tyres, free = scene.tyres, first.vehicle
     loads = ", ".join(f"{name} {load:.0f} N" for name, load in first.held.tyres.items())
     mass = sum(body.mass for body in free.bodies)

@@ -155,7 +155,8 @@ class SimulatedDrive:
 
 
 def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: bool = False) -> Result:
-    """Run a manoeuvre, by default the first, in "exudyn", "mujoco" or "reference"; the result's detail is the Drive.
+    """Run a manoeuvre, by default the first, in "exudyn", "mujoco" or "reference"; the result's detail is the
+    SimulatedDrive.
 
     error : whether the error of time steps and cells is estimated, by further runs. Raises RunFailed where the vehicle
     turns over, the step is too long or the motion is not finite.
@@ -355,6 +356,7 @@ def build_in_engine(engine: str, handling_model: Handling, solver_settings: Sett
 
 
 def _plain_equations(handling_model: Handling) -> "PlainRolling":
+    """Returns the plain equations of the vehicle, which share no code with the engines."""
     from models.multibody.plain.rolling import PlainRolling
 
     return PlainRolling(handling_model)

@@ -132,7 +132,7 @@ class HandlingScene(SceneFile):
 
     def handling(self, manoeuvre_name: str) -> Handling:
         """Returns vehicle, tyres, road and controls of a manoeuvre. Torques of a measured drive are computed once."""
-        car = self.car(manoeuvre_name)
+        car = self.model_with_scene_controls(manoeuvre_name)
         if not self.manoeuvres[manoeuvre_name].measured:
             return car
         if manoeuvre_name not in self._measured_controls:
@@ -143,7 +143,7 @@ class HandlingScene(SceneFile):
             )
         return car.changed(controls=self._measured_controls[manoeuvre_name])
 
-    def car(self, manoeuvre_name: str) -> Handling:
+    def model_with_scene_controls(self, manoeuvre_name: str) -> Handling:
         """Returns vehicle, tyres, road and scene controls of a manoeuvre, without the controls of a measured drive."""
         manoeuvre, road = self.manoeuvres[manoeuvre_name], self.road
         waves = (

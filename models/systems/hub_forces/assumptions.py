@@ -15,7 +15,7 @@ from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 _SMOOTHER_ROAD_ADVICE = (
     "take a smoother road.iso8608, a lower road.speed, stiffer springs, or give them a stop as travel_force"
 )
-ON_TYRES = "on tyres"
+RUN_ON_TYRES = "on tyres"
 """Name that stands for the run on the road (virtual measurement) where otherwise a stabiliser is named."""
 PULL_LIMIT = 1.0
 """Largest pull (N) of a tyre at the road that does not count as leaving the road."""
@@ -45,13 +45,14 @@ the change of vertical speed (m/s) that a rough road may cause between the ends 
 def assumptions(
     scene: HubScene, vehicle: CutVehicle, stabiliser_method: str, measured_angles: MeasuredAngles | None = None
 ) -> list[Assumption]:
-    """Assumptions of a run with a stabiliser (``stabiliser_method``), or of the run on tyres over the road (ON_TYRES).
+    """Assumptions of a run with a stabiliser (``stabiliser_method``), or of the run on tyres over the road
+    (RUN_ON_TYRES).
 
     measured_angles : measured angles with which the run is compared; None if the assumptions are only listed.
     """
     listed = (
         _assumptions_on_tyres(vehicle)
-        if stabiliser_method == ON_TYRES
+        if stabiliser_method == RUN_ON_TYRES
         else _assumptions_on_forces(scene, vehicle, stabiliser_method, measured_angles)
     )
     return [

@@ -8,14 +8,16 @@ from models.engines.native_parts import divide
 from models.systems.hub_forces.scene import HubScene
 from models.vehicles.cut_vehicle import CutVehicle
 
-AXES = "x forward, y left, z up; the chassis has position, heading, pitch (nose down) and roll; zero is the design."
+AXES_TEXT = (
+    "x forward, y left, z up; the chassis has position, heading, pitch (nose down) and roll; zero is the design."
+)
 
 
 def exported(scene: HubScene, engine: str) -> Exported:
     """Export the vehicle without tyres, hub forces and stabiliser as a model file of "mujoco" or "exudyn"."""
     vehicle = scene.cut_vehicle()
     omissions = [] if scene.stabilise.method == "none" else [f"stabiliser of roll and pitch ({scene.stabilise.method})"]
-    return export_cut_vehicle(engine, vehicle, ExportSubject(scene.title, scene.file, AXES), omissions)
+    return export_cut_vehicle(engine, vehicle, ExportSubject(scene.title, scene.file, AXES_TEXT), omissions)
 
 
 def export_cut_vehicle(

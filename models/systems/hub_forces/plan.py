@@ -14,7 +14,7 @@ from models.engines.cut_vehicle import check_step, native_share
 from models.engines.error_control import plan_lines
 from models.engines.free_vehicle import ENGINES as FREE_ENGINES
 from models.measured.signal import UNIT_OF_QUANTITY, MeasuredSignal, Quantity
-from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
+from models.systems.hub_forces.assumptions import RUN_ON_TYRES, assumptions
 from models.systems.hub_forces.scene import ForceFrame, HubScene
 from models.vehicles.cut_vehicle import CutVehicle, rigid_vehicle
 from models.vehicles.plausible import plausible
@@ -91,7 +91,7 @@ def describe(scene: HubScene) -> str:
     lines += [_plan_line("doubt", text) for text in filter_objections(scene)]
     lines += _engine_share_lines(scene, vehicle)
     never = "drag, tyres that roll"
-    runs = [*([ON_TYRES] if scene.road is not None else []), scene.stabilise.method]
+    runs = [*([RUN_ON_TYRES] if scene.road is not None else []), scene.stabilise.method]
     assumed = {assumption.says: assumption for run in runs for assumption in assumptions(scene, vehicle, run)}
     return "\n".join([*lines, *effect_lines(scene), *assumption_lines(assumed.values()), _plan_line("never", never)])
 

@@ -24,7 +24,7 @@ from models.engines.cut_vehicle import ForceRoute, HubModel, HubRun, build
 from models.engines.error_control import NO_ESTIMATE
 from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
+from models.systems.hub_forces.assumptions import RUN_ON_TYRES, assumptions
 from models.systems.hub_forces.measurement import HubForces, MeasuredAngles, recorded_measurement, road_under_wheels
 from models.systems.hub_forces.scene import ForceFrame, HubScene, StabiliserMethod, TwoTrackRoadTable
 from models.vehicles.cut_vehicle import ANGLES, PITCH, ROLL, CutVehicle, X, Y, Z
@@ -248,35 +248,32 @@ def _moving_channels(
 def run(
     scene: HubScene,
     engine: str,
-    stabiliser_method: StabiliserMethod | None = None,
+    method: StabiliserMethod | None = None,
     measurement: HubMeasurement | None = None,
     error: bool = False,
 ) -> Result:
     """Run the vehicle without tyres under its hub forces; the result's detail is the HubRun. Raises InputError,
     Refused or RunFailed.
 
-    stabiliser_method : stabiliser of roll and pitch, by default the scene's; measurement : of the scene, if it exists
+    method : stabiliser of roll and pitch, by default the scene's; measurement : of the scene, if it exists
     already, as for runs in several engines; else this engine makes it. error : whether the errors of the time steps are
     estimated, by further runs, and added to those of the measurement.
     """
-    measurement, stabiliser_method = (
-        measurement or measure(scene, engine, error),
-        stabiliser_method or scene.stabilise.method,
-    )
-    hub_inputs = measurement.hub_inputs(stabiliser_method, scene.run.step, scene.step_count)
-    kind = scene.spring_force_route(stabiliser_method)
+    measurement, method = (measurement or measure(scene, engine, error), method or scene.stabilise.method)
+    hub_inputs = measurement.hub_inputs(method, scene.run.step, scene.step_count)
+    kind = scene.spring_force_route(method)
     model = HubModel(engine, measurement.vehicle, hub_inputs, scene.settings(engine), kind)
     start_time = time.process_time()
     path = model.run(*np.split(measurement.start(hub_inputs), 2))
     seconds = time.process_time() - start_time
-    result = labelled_result(measurement, path, engine, stabiliser_method, seconds)
+    result = labelled_result(measurement, path, engine, method, seconds)
     if not error:
         return result
     if engine in scene.engines:
         return not_estimated(result, NO_ESTIMATE)
     vehicle, period = measurement.vehicle, measurement.forces.period
     estimates, method_text = errors_of_steps(
-        engine, vehicle, path, partial(measurement.hub_inputs, stabiliser_method), period, kind
+        engine, vehicle, path, partial(measurement.hub_inputs, method), period, kind
     )
     if (
         measurement_errors := measurement.errors
@@ -293,7 +290,7 @@ def labelled_result(
     measurement: HubMeasurement,
     hub_run: HubRun,
     engine: str,
-    stabiliser_method: str = ON_TYRES,
+    stabiliser_method: str = RUN_ON_TYRES,
     run_seconds: float = 0.0,
 ) -> Result:
     """Returns the result of a run: motion of the chassis, section forces of all elements, moments of the stabiliser on

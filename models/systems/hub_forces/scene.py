@@ -25,7 +25,7 @@ from models.systems.hub_forces.measurement import HubForces, MeasuredAngles
 from models.vehicles.cut_vehicle import CutVehicle, cut
 
 ForceFrame = Literal["hub", "body", "inertial"]
-Noise = Literal["white", "none"]
+NoiseKind = Literal["white", "none"]
 StabiliserMethod = Literal["none", "kalman", "prescribed"]
 FACTOR_TO_NEWTON_METRES = {"N m": 1.0, "kN m": 1e3}
 """Units of moments that files may have, with their factors to N m."""
@@ -89,7 +89,7 @@ class HubForceTable(Strict):
     interpolation: Interpolation = Field(default="linear", description="held, linear or smooth between the samples")
     accept: list[str] = Field(default=[], description="findings of the checks of a file, by name, that are meant so")
     sampling_rate: float = quantity("Hz", "of the virtual measurement", default=500.0)
-    noise: Noise = Field(default="white", description="of the virtual measurement; what is stated stays")
+    noise: NoiseKind = Field(default="white", description="of the virtual measurement; what is stated stays")
     force_deviation: float = quantity("N", "white noise of every force sample", default=8.0)
     moment_deviation: float = quantity("N m", "white noise of every moment sample", default=1.0)
 
@@ -98,7 +98,7 @@ class MeasuredAngleTable(Strict):
     """[angles]: measured roll and pitch with their rates, and the deviations of their noise."""
 
     file: str | None = Field(default=None, description="CSV: time [s], roll, pitch [rad]; roll_rate, pitch_rate")
-    noise: Noise = Field(default="white", description="of the virtual measurement; what the filter is told stays")
+    noise: NoiseKind = Field(default="white", description="of the virtual measurement; what the filter is told stays")
     angle_deviation: float = quantity("rad", "white noise of every angle", default=1.75e-3)
     rate_deviation: float = quantity("rad/s", "white noise of every rate", default=5e-3)
 

@@ -31,7 +31,7 @@ errors of the mean. One faultless run in 4000 exceeds the second; a gyro wrong b
 """
 MEASURED_VALUES = "roll", "pitch", "roll_rate", "pitch_rate"
 """Names of the measured values of the filter, in the order of its state."""
-LARGEST_UNEXPLAINED = 0.65
+LARGEST_UNEXPLAINED_SHARE = 0.65
 """Largest share of the measured rates that hub forces may leave unexplained. The rigid vehicle leaves 0.3 to 0.45 of
 them on rough roads, because its springs move; forces in another frame than stated leave 0.8, exchanged hubs 2 and
 more."""
@@ -198,10 +198,10 @@ class TiltFilter:
         unexplained, measured_change = self.state.rate_variances
         share = np.sqrt(unexplained / np.where(measured_change > 0, measured_change, 1.0))
         for name, turning_part in zip(("roll", "pitch"), share, strict=True):
-            if not turning_part <= LARGEST_UNEXPLAINED:
+            if not turning_part <= LARGEST_UNEXPLAINED_SHARE:
                 contradiction = (
                     f"{turning_part:.0%} of it is not the integral of their moment (at most "
-                    f"{LARGEST_UNEXPLAINED:.0%}): {SIGNAL_REMEDY}"
+                    f"{LARGEST_UNEXPLAINED_SHARE:.0%}): {SIGNAL_REMEDY}"
                 )
                 raise InputError(self.file, f"angles.{name}_rate", None, f"contradicts the hub forces: {contradiction}")
 

@@ -211,6 +211,7 @@ def _read_at(sampled_values: np.ndarray, samples_later: np.ndarray) -> np.ndarra
 def _divided_by_factor(
     finding: Finding, signals: Sequence[MeasuredSignal], samples_by_signal: SamplesBySignal, sample_period: float
 ) -> SamplesBySignal:
+    """Samples of signals divided by the factor by which, as the finding says, they are too large."""
     size = finding.size or 0.0
     factor = 1.0 + size / 100 if finding.unit == "%" else size
     return {s: samples_by_signal[s] / factor for s in signals}
@@ -219,12 +220,14 @@ def _divided_by_factor(
 def _offset_removed(
     finding: Finding, signals: Sequence[MeasuredSignal], samples_by_signal: SamplesBySignal, sample_period: float
 ) -> SamplesBySignal:
+    """Samples of signals less the offset (SI) that the finding states."""
     return {s: samples_by_signal[s] - (finding.size or 0.0) for s in signals}
 
 
 def _moments_corrected(
     finding: Finding, signals: Sequence[MeasuredSignal], samples_by_signal: SamplesBySignal, sample_period: float
 ) -> SamplesBySignal:
+    """Samples of moments moved by the lever (m) that the finding states, with the measured forces across it."""
     force = {(s.at, s.component): s for s in samples_by_signal if s.quantity == "force" and not s.check}
     across = {"x": ("y", -1.0), "y": ("x", 1.0)}
     return {
@@ -237,6 +240,7 @@ def _moments_corrected(
 def _channels_exchanged(
     finding: Finding, signals: Sequence[MeasuredSignal], samples_by_signal: SamplesBySignal, sample_period: float
 ) -> SamplesBySignal:
+    """Samples of two signals, each with those of the other."""
     first, second = signals
     return {first: samples_by_signal[second], second: samples_by_signal[first]}
 

@@ -73,4 +73,5 @@ def _principal_channels(
 
 
 def _unit(run_settings: SectionRunSettings, element_name: str) -> str:
+    """Unit of the force or moment of an element: N or N m."""
     return next(candidate.unit for candidate in run_settings.vehicle.elements if candidate.name == element_name)

@@ -2,7 +2,7 @@
 
 from models.core.errors import InputError
 from models.engines.export import Exported, ExportSubject
-from models.systems.hub_forces.export import AXES, export_cut_vehicle
+from models.systems.hub_forces.export import AXES_TEXT, export_cut_vehicle
 from models.systems.measured.scene import MeasuredScene
 
 
@@ -15,5 +15,5 @@ def exported(scene: MeasuredScene, engine: str) -> Exported:
         allowed = "is driven in the pitch plane: export a scene of that system with the same parameters"
         raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)
     return export_cut_vehicle(
-        engine, vehicle, ExportSubject(scene.title, scene.file, AXES), ["stabiliser of roll and pitch"]
+        engine, vehicle, ExportSubject(scene.title, scene.file, AXES_TEXT), ["stabiliser of roll and pitch"]
     )

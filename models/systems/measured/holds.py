@@ -9,7 +9,7 @@ from models.measured.signal import Quantity
 from models.systems.measured.scene import MeasuredScene, NoiseTable
 from models.systems.measured.section_run import AttitudeHold
 
-FREE_RUN = "free"
+FREE_RUN_NAME = "free"
 """Name of the run without a stabiliser."""
 QUANTITY_OF_NOISE_KEY: dict[str, Quantity] = {
     "force": "force",
@@ -30,7 +30,7 @@ def stabilisers_of_runs(scene: MeasuredScene, recording: Recording) -> dict[str,
             settings.method, settings.bandwidth, settings.model, settings.smoothing, **deviations
         )
     }
-    return {FREE_RUN: AttitudeHold("none", **deviations)} | ({} if settings.method == "none" else stabilised_hold)
+    return {FREE_RUN_NAME: AttitudeHold("none", **deviations)} | ({} if settings.method == "none" else stabilised_hold)
 
 
 def noise_deviations(stated_deviations: NoiseTable, recording: Recording) -> dict[str, float]:

@@ -153,6 +153,9 @@ class RecordingInputs:
     def _signal_block(
         self, signals: list[MeasuredSignal | None], first_sample: int, sample_count: int, missing_value: float
     ) -> np.ndarray:
+        """Samples (n, signals) from ``first_sample`` on, with bridged gaps, and ``missing_value`` for signals that are
+        None.
+        """
         out = np.full((min(sample_count, self.recording.count - first_sample), len(signals)), missing_value)
         for i, signal in enumerate(signals):
             if signal is not None:

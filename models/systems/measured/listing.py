@@ -17,7 +17,7 @@ from models.measured.formats import open_source
 from models.measured.signal import UNIT_OF_QUANTITY, Quantity
 from models.measured.units import quantities_of_unit
 
-MOST_BLOCKS_READ = 20
+LARGEST_BLOCK_COUNT = 20
 """Most blocks of a channel group that are read for the range of values: all of a file of twenty minutes at 1 kHz."""
 SCENE_TEMPLATE = """\
 title = "{title}"
@@ -183,7 +183,10 @@ def _range_texts(measurement_file: MeasurementSource, channel_names: list[str]) 
     count = next(channel.count for channel in measurement_file.channels if channel.name == channel_names[0])
     firsts = (
         sorted(
-            {*range(0, count, max(SAMPLES_PER_BLOCK, -(-count // MOST_BLOCKS_READ))), max(count - SAMPLES_PER_BLOCK, 0)}
+            {
+                *range(0, count, max(SAMPLES_PER_BLOCK, -(-count // LARGEST_BLOCK_COUNT))),
+                max(count - SAMPLES_PER_BLOCK, 0),
+            }
         )
         if count
         else []

@@ -40,7 +40,7 @@ UNCHECKED_TEXT = (
     "free, with forces that turn with the vehicle and no measured pitch: an offset, or forces of another frame, "
     "would drive it off unseen"
 )
-EFFECT_OF_HOLD = {"kalman": "kalman_filter", "prescribed": "prescribed_pitch"}
+EFFECT_OF_STABILISER = {"kalman": "kalman_filter", "prescribed": "prescribed_pitch"}
 """Effects of the pitch-plane system by stabiliser method."""
 SPRING_NAMES = {"f3": "front spring", "f4": "rear spring"}
 """Names of the suspension forces as sections."""
@@ -62,7 +62,7 @@ class PlaneRunSettings:
     @property
     def effect(self) -> str | None:
         """Name of the effect that stabilises the pitch; None for a free run."""
-        return EFFECT_OF_HOLD.get(self.hold.method)
+        return EFFECT_OF_STABILISER.get(self.hold.method)
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ from models.systems.measured.consequences import Consequence, consequences
 from models.systems.measured.consequences import verdict_with_consequences as judged_by_consequences
 from models.systems.measured.errors import errors_of_steps
 from models.systems.measured.hand_on import FILE_STEM, labelled_result, section_force_channels, write_section_forces
-from models.systems.measured.holds import FREE_RUN, QUANTITY_OF_NOISE_KEY, stabilisers_of_runs
+from models.systems.measured.holds import FREE_RUN_NAME, QUANTITY_OF_NOISE_KEY, stabilisers_of_runs
 from models.systems.measured.pitch_plane import PlaneRunSettings
 from models.systems.measured.pitch_plane import run as run_plane
 from models.systems.measured.plan import opened_files, signals_of_files
@@ -115,7 +115,7 @@ class RecordingAnalysis:
     def is_input(self, signal: MeasuredSignal) -> bool:
         """Whether a signal is an input of the chosen run; other signals are only compared with the run."""
         moving = signal.at == self.rig.chassis and signal.quantity in ("angle", "angular rate")
-        return not signal.check and (signal.at in self.rig.hubs or (moving and self.chosen_run != FREE_RUN))
+        return not signal.check and (signal.at in self.rig.hubs or (moving and self.chosen_run != FREE_RUN_NAME))
 
     def forces(self, run_outcome: SectionOutcome) -> list[SectionChannel]:
         """Channels of section forces and moments of a run at the scene's sections, or at all sections if the scene
@@ -157,7 +157,7 @@ class RecordingAnalysis:
         shutil.rmtree(run_folder, ignore_errors=True)  # a run of seconds: what a killed one has left is made anew
         run = run_plane(job, run_folder, self.scene.limits, estimate_error and run_name == self.chosen_run)
         self.verdicts[run_name], self.plane = run.verdict, run.result
-        if run_name == FREE_RUN and run.trust is not None:
+        if run_name == FREE_RUN_NAME and run.trust is not None:
             self.trust = (("pitch", run.trust),)
         return run.outcome
 
@@ -175,11 +175,11 @@ def run(
     scene: MeasuredScene,
     engine: str = "",
     folder: Path | None = None,
-    report_progress: Progress = report_no_progress,
+    progress: Progress = report_no_progress,
     whole_run: bool = False,
     error: bool = False,
 ) -> Result:
-    """Run a recording with the scene's stabiliser; the result's detail is the Examination.
+    """Run a recording with the scene's stabiliser; the result's detail is the ``RecordingAnalysis``.
 
     folder : folder of all samples, from which an interrupted run is resumed; without a folder they live as long as the
     detail. whole_run : whether the recording is also checked, run free and judged, and section forces are written to
@@ -188,10 +188,10 @@ def run(
     """
     temporary = None if folder else TemporaryDirectory()
     folder = folder or Path(temporary.name if temporary else "")
-    exam = _start_examination(scene, engine or scene.run.engine, folder, report_progress, error)
+    exam = _start_examination(scene, engine or scene.run.engine, folder, progress, error)
     exam.temporary_folder = temporary
     if whole_run:
-        _examine(exam, folder, report_progress, error)
+        _examine(exam, folder, progress, error)
     else:
         begun = time.process_time()
         exam.runs[exam.chosen_run] = exam.march(
@@ -250,7 +250,7 @@ def _with_error(run_result: Result, recording_analysis: RecordingAnalysis, work_
 def _start_examination(
     scene: MeasuredScene, engine: str, output_folder: Path, report_progress: Progress, estimate_error: bool
 ) -> RecordingAnalysis:
-    """Start an examination: resample the recording from the scene's files, or from those of a virtual measurement."""
+    """Start the analysis: resample the recording from the scene's files, or from those of a virtual measurement."""
     rig, virtual, seconds, start_time = scene.rig(), None, dict[str, float](), time.perf_counter()
     (output_folder / WORK_FOLDER).mkdir(parents=True, exist_ok=True)
     if scene.virtual is not None and rig.vehicle is not None:
@@ -322,7 +322,7 @@ def _predict_drift(recording_analysis: RecordingAnalysis, vehicle: CutVehicle) -
     """Predict the drift of the free run, which begins level and at rest: from noise, from mean moments that contradict
     the motion, and from the measured initial tilt and rates.
     """
-    recording, free = recording_analysis.recording, recording_analysis.holds[FREE_RUN]
+    recording, free = recording_analysis.recording, recording_analysis.holds[FREE_RUN_NAME]
     tilt, rate = (
         [_initial_value(recording, what, axis, vehicle.chassis) for axis in ("roll", "pitch")]
         for what in ("angle", "angular rate")
@@ -432,7 +432,7 @@ def _add_consequences(recording_analysis: RecordingAnalysis, work_folder: Path) 
         recording_analysis.chosen_run
         if recording_analysis.chosen_run in recording_analysis.runs
         and recording_analysis.chosen_run not in recording_analysis.failed
-        else FREE_RUN
+        else FREE_RUN_NAME
     )
     if name in recording_analysis.runs:
         rerun, answers = (
@@ -466,7 +466,7 @@ def _save_section_forces(
 
 
 def _labelled_result(scene: MeasuredScene, recording_analysis: RecordingAnalysis, output_folder: Path) -> Result:
-    """Returns the result of a recording's scene; its detail is the examination."""
+    """Returns the result of a recording's scene; its detail is the ``RecordingAnalysis``."""
     return labelled_result(
         scene,
         recording_analysis.outcome,

@@ -123,7 +123,7 @@ class MeasuredRunTable(Strict):
     step: float | None = quantity("s", "of Runge-Kutta 4; else the clock's period, or a part of it", default=None)
 
 
-class HandOnTable(Strict):
+class SectionForceFilesTable(Strict):
     """[hand_on]: sections, file formats and Woehler exponents of the section forces that are written to files."""
 
     sections: list[str] | None = Field(default=None, description="springs, mounts, bars, joints; all if not named")
@@ -150,7 +150,7 @@ class MeasuredScene(SceneFile):
     stabilise: MeasuredStabiliserTable = MeasuredStabiliserTable()
     run: MeasuredRunTable = MeasuredRunTable()
     limits: AcceptanceLimits = Field(default=RUN_LIMITS, description="of the verdict")
-    hand_on: HandOnTable = HandOnTable()
+    hand_on: SectionForceFilesTable = SectionForceFilesTable()
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     def rig(self) -> MeasuredRig:

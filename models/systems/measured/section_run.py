@@ -198,7 +198,7 @@ def run(
     topples.
     """
     check_settings(run_settings)
-    march = _March(
+    march = _RunInProgress(
         run_settings,
         run_folder,
         max(round(block_duration / (run_settings.grid.step * run_settings.grid.steps_per_output)), 1),
@@ -211,7 +211,7 @@ def run(
     return march.outcome()
 
 
-class _March:
+class _RunInProgress:
     """A run in progress: ``done`` output samples are on disk; ``state`` (2 n,) is the state at the next sample."""
 
     def __init__(self, run_settings: SectionRunSettings, run_folder: Path, block_length: int) -> None:

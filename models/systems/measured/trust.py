@@ -26,7 +26,7 @@ from models.multibody.cut_kernel import WRENCH
 from models.systems.pitch_plane.trust import UNTRUSTED_PITCH, TrustPrediction
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, RigidVehicle, rigid_vehicle
 
-SUMMED_TIMES = 2000
+SUMMED_TIME_COUNT = 2000
 """Number of time intervals by which the laws of drift are integrated."""
 
 
@@ -109,7 +109,7 @@ def predicted_drift(
     """
     body, law = (
         rigid_vehicle(vehicle),
-        _AngleResponse(rigid_vehicle(vehicle), force_frame, np.linspace(0.0, duration, SUMMED_TIMES + 1)),
+        _AngleResponse(rigid_vehicle(vehicle), force_frame, np.linspace(0.0, duration, SUMMED_TIME_COUNT + 1)),
     )
     noise = sample_period * body.turning(measurement_errors.deviations(vehicle))
     spread = np.sqrt(

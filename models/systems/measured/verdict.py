@@ -54,7 +54,7 @@ STRETCH_LENGTH, STRETCH_ERROR_LIMIT = 1.0, 0.5
 """Length (s) of a stretch of a channel, and the rms error divided by the channel's rms above which a stretch is not
 trusted.
 """
-WORDS_OF_SCORE = {
+WORDS_FOR_SPATIAL_VEHICLE = {
     "I pitch''": "what turns the chassis",
     "the measured pitch": "measured roll and pitch",
     "pitch wrong": "roll or pitch wrong",
@@ -62,7 +62,7 @@ WORDS_OF_SCORE = {
     "pitch of": "roll or pitch of",
 }
 """Words of verdicts on the pitch plane (``models.drift.score``), and the words for a spatial vehicle."""
-EFFECTS_OF_HOLD = {"kalman": {"kalman_filter"}, "prescribed": {"prescribed_pitch"}, "none": set[str]()}
+EFFECTS_OF_STABILISER = {"kalman": {"kalman_filter"}, "prescribed": {"prescribed_pitch"}, "none": set[str]()}
 """Names that ``models.drift.score`` uses for each stabiliser method."""
 
 
@@ -222,7 +222,7 @@ def judge_run(
         )
     verdict = score.verdict_without_true_run(
         figures_of_run(run_outcome, run_settings.vehicle),
-        EFFECTS_OF_HOLD[run_settings.hold.method],
+        EFFECTS_OF_STABILISER[run_settings.hold.method],
         run_outcome.period * (run_outcome.done - 1),
         verdict_limits,
         trusted_time,
@@ -260,14 +260,14 @@ def judge_beside_truth(
         errors_of_run(run_outcome, true_measurement, woehler_exponent),
     )
     return _worded_for_spatial_vehicle(
-        score.verdict_on_run(*figures, EFFECTS_OF_HOLD[attitude_hold.method], verdict_limits)
+        score.verdict_on_run(*figures, EFFECTS_OF_STABILISER[attitude_hold.method], verdict_limits)
     )
 
 
 def _worded_for_spatial_vehicle(verdict: StabilisedRunVerdict) -> StabilisedRunVerdict:
     """Returns the verdict with words for the pitch plane replaced by words for a spatial vehicle."""
     reason = verdict.reason
-    for plane, space in WORDS_OF_SCORE.items():
+    for plane, space in WORDS_FOR_SPATIAL_VEHICLE.items():
         reason = reason.replace(plane, space)
     return StabilisedRunVerdict(verdict.word, reason)
 
@@ -291,6 +291,7 @@ def figures_of_run(run_outcome: SectionOutcome, vehicle: CutVehicle) -> RunFigur
 
 
 def _rms_ratio(part_values: np.ndarray, total_values: np.ndarray) -> float:
+    """Root mean square of some values divided by that of all; 1 or 0 where all of them are 0."""
     return (
         root_mean_square(part_values) / root_mean_square(total_values)
         if root_mean_square(total_values) > 0

@@ -61,6 +61,7 @@ def watch_function(**channel_by_name: str) -> partial[Watched]:
 
 
 def _watched_channels(channel_by_name: dict[str, str], run_result: Result) -> Watched:
+    """Values of some channels of a result under other names."""
     return {name.replace("_", " "): run_result[channel] for name, channel in channel_by_name.items()}
 
 
@@ -68,6 +69,9 @@ _watched_pitch = watch_function(chassis="pitch")
 
 
 def _tyre_assumptions(vehicle_assembly: Assembly, tyres_may_lift: bool) -> list[Assumption]:
+    """Assumptions that tyres are not pressed to their rims and, where they may not lift, that they press on the
+    road.
+    """
     pressed = Assumption(
         "tyres not flat",
         "no tyre is pressed to its rim",

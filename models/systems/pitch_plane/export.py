@@ -6,7 +6,7 @@ from models.engines.assembly import Assembly, Settings
 from models.engines.export import Exported, ExportSubject, exported_exudyn_system, exported_mujoco_model
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 
-AXES = {
+AXES_TEXT_BY_ENGINE = {
     "mujoco": "x forward, y right, z down, so that gravity is positive; pitch is positive with the nose up.",
     "exudyn": "x backward, y down; pitch is positive with the nose up.",
 }
@@ -23,7 +23,7 @@ INPUTS_OF_MODE = {
 
 def exported(scene: Scene, engine: str) -> Exported:
     """Export the pitch-plane vehicle as a model file of "mujoco" or "exudyn"."""
-    assembly, subject = assembly_of_scene(scene), ExportSubject(scene.title, scene.file, AXES[engine])
+    assembly, subject = assembly_of_scene(scene), ExportSubject(scene.title, scene.file, AXES_TEXT_BY_ENGINE[engine])
     left_out = _left_out(assembly)
     if engine == "exudyn":
         return _in_exudyn(assembly, subject, left_out)

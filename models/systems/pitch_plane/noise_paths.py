@@ -29,7 +29,7 @@ from models.ensemble.runner import PathFailed
 from models.ensemble.store import ArraysByName
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, effects_in_order, settings_of
 
-DRIFT_OFF_PITCH = 0.05
+LARGEST_PITCH_BEFORE_DRIFT_OFF = 0.05
 """Difference (rad) from the true pitch beyond which a path has drifted off, unless the job has another threshold."""
 
 
@@ -53,7 +53,7 @@ class NoisePaths:
     settings: Settings
     rows: np.ndarray
     truth: np.ndarray
-    threshold: float = DRIFT_OFF_PITCH
+    threshold: float = LARGEST_PITCH_BEFORE_DRIFT_OFF
 
     def assembly(self, noise_path: int) -> Assembly:
         """Returns the assembly of the scene with the noise path of a number."""
@@ -79,17 +79,20 @@ class NoisePaths:
             except Exception as error:
                 raise PathFailed(path, f"{type(error).__name__}: {error}") from error
 
-    def __call__(self, path_numbers: range) -> ArraysByName:
+    def __call__(self, paths: range) -> ArraysByName:
         """Runs a block of n paths. Returns arrays by name.
 
         ``states`` (n, rows, 8); ``drift_off`` (n,): first time (s) at which the pitch is further than ``threshold``
         from the truth, infinite if never; ``failed`` (n,): last good time (s) of a path that left all bounds, whose
         states are then NaN and whose drift-off is at the latest that time; NaN for all others.
         """
-        columns = zip(*map(self._saved_part, self.trajectories(path_numbers)), strict=True)
+        columns = zip(*map(self._saved_part, self.trajectories(paths)), strict=True)
         return {name: np.array(column) for name, column in zip(("states", "drift_off", "failed"), columns, strict=True)}
 
     def _saved_part(self, path_outcome: Trajectory | RunFailed) -> tuple[np.ndarray, float, float]:
+        """Returns the states (rows, 8) at the saved steps, NaN after a failure; then the time (s) at which the pitch
+        drifts off, infinite if it never does, and the time (s) of the failure, NaN without one.
+        """
         if isinstance(path_outcome, RunFailed):
             failure_time = 0.0 if path_outcome.time is None else path_outcome.time
             return np.full((len(self.rows), 8), np.nan), failure_time, failure_time
@@ -116,7 +119,7 @@ def noise_paths(
     scene: Scene,
     saved_times: np.ndarray,
     true_states: np.ndarray | None = None,
-    drift_off_pitch: float = DRIFT_OFF_PITCH,
+    drift_off_pitch: float = LARGEST_PITCH_BEFORE_DRIFT_OFF,
     engine: str = "reference",
 ) -> NoisePaths:
     """Returns the job that runs a scene's noise paths; states are returned at ``saved_times`` (s), multiples of the
@@ -231,7 +234,7 @@ def mujoco_threads(
     scene: Scene,
     saved_times: np.ndarray,
     true_states: np.ndarray | None = None,
-    drift_off_pitch: float = DRIFT_OFF_PITCH,
+    drift_off_pitch: float = LARGEST_PITCH_BEFORE_DRIFT_OFF,
     thread_count: int = 2,
 ) -> MujocoThreads:
     """Returns the job that runs a scene's noise paths in MuJoCo with several threads; arguments as of

@@ -9,7 +9,7 @@ from models.ensemble.statistics import FAN_PERCENTILES
 from models.ensemble.store import ArraysByName
 from models.ensemble.streamed import MagnitudeQuantiles, StreamedCovariance, StreamedMoments, ValueCounts
 
-PITCH_STATE = 3
+PITCH_STATE_INDEX = 3
 """Index of the pitch in a state."""
 
 
@@ -37,10 +37,12 @@ class PathStatistics:
         errors = path_block["states"] - self._true
         self.moments.add(errors)
         self.covariance.add(errors)
-        self._spread.add(errors[:, :, PITCH_STATE])
+        self._spread.add(errors[:, :, PITCH_STATE_INDEX])
         self.drift_off.add(path_block["drift_off"])
         self.lost += int(np.isfinite(path_block["failed"]).sum())
-        self.steepest = np.fmax(self.steepest, np.fmax.reduce(np.abs(path_block["states"][:, :, PITCH_STATE]), axis=0))
+        self.steepest = np.fmax(
+            self.steepest, np.fmax.reduce(np.abs(path_block["states"][:, :, PITCH_STATE_INDEX]), axis=0)
+        )
         paths_kept = sum(len(saved_block["drift_off"]) for saved_block in self._blocks)
         if paths_kept < self._saved:
             self._blocks.append({name: values[: self._saved - paths_kept] for name, values in path_block.items()})

@@ -35,7 +35,7 @@ FILTERED_STATES = np.array([0, 1, 3, 4, 5, 7])
 RELATIVE_STATES = np.eye(8)[FILTERED_STATES]
 RELATIVE_STATES[0:2, 2] = RELATIVE_STATES[3:5, 6] = -1.0
 """Matrix (6, 8) that maps the vehicle's state to z1 - z3, z2 - z3, pitch and their rates."""
-PITCH_INERTIA = 5
+PITCH_INERTIA_INDEX = 5
 """Index of the pitch inertia in the vehicle's array of parameters."""
 DIFFERENCE_WIDTHS = np.array([1.0, *[1e-5] * 6, 1e-2, *[1e3] * 4])
 """Half widths of the central differences: none for the step itself, then of the states (m, rad, m/s, rad/s), the share
@@ -107,7 +107,7 @@ def compiled_filter_step(drive_mode: str, geometry: str) -> Any:
             for sign in (1.0, -1.0):
                 y, pushed, nudge = np.zeros(8), force_inputs, sign * DIFFERENCE_WIDTHS[column]
                 y[FILTERED_STATES] = filter_state[:6]
-                parameters[PITCH_INERTIA] = vehicle_parameters[PITCH_INERTIA] / (
+                parameters[PITCH_INERTIA_INDEX] = vehicle_parameters[PITCH_INERTIA_INDEX] / (
                     1.0 + filter_state[6] + (nudge if column == 7 else 0.0)
                 )
                 if 0 < column < 7:

@@ -32,34 +32,27 @@ calls of a method of order 8.
 
 
 def run(
-    scene: Scene,
-    engine: str,
-    solver_settings: Settings | None = None,
-    vehicle_assembly: Assembly | None = None,
-    error: bool = False,
+    scene: Scene, engine: str, settings: Settings | None = None, assembly: Assembly | None = None, error: bool = False
 ) -> Result:
     """Run a pitch-plane scene in an engine; the result's detail is the trajectory at every step. Raises InputError,
     Refused or RunFailed, never returns a partial run.
 
-    solver_settings : in place of the scene's; vehicle_assembly : in place of the scene's, where it is known already or
+    settings : in place of the scene's; assembly : in place of the scene's, where it is known already or
     was changed by hand; error : whether the error of the time steps is estimated, by further runs. Assumptions are
     always checked. A run of an engine outside of this package is compared with the reference; the comparison is in
     "beside reference".
     """
-    vehicle_assembly, solver_settings = (
-        vehicle_assembly or assembly_of_scene(scene),
-        solver_settings or settings_of(scene, engine),
-    )
-    rows = slice(None, None, _steps_per_saved_row(scene, solver_settings))
-    model = build(engine, vehicle_assembly, solver_settings)
+    assembly, settings = (assembly or assembly_of_scene(scene), settings or settings_of(scene, engine))
+    rows = slice(None, None, _steps_per_saved_row(scene, settings))
+    model = build(engine, assembly, settings)
     start = time.perf_counter()
     trajectory = model.run()
     seconds = time.perf_counter() - start
-    channels, comparison_texts = output_channels(vehicle_assembly, trajectory, model), dict[str, str]()
+    channels, comparison_texts = output_channels(assembly, trajectory, model), dict[str, str]()
     if engine in OUTSIDE_CLASSES:
         from models.engines.outside import beside_reference
 
-        comparison_texts["beside reference"] = beside_reference(engine, vehicle_assembly, solver_settings, trajectory)
+        comparison_texts["beside reference"] = beside_reference(engine, assembly, settings, trajectory)
     labelled = result(
         scene,
         {name: Channel("time", values[rows], unit, meaning) for name, (unit, meaning, values) in channels.items()},
@@ -67,16 +60,16 @@ def run(
         engine=engine,
         counts=trajectory.counts,
         seconds=seconds,
-        doubts=vehicle_assembly.doubts,
+        doubts=assembly.doubts,
         detail=trajectory,
-        mode=vehicle_assembly.mode,
-        integrator=solver_settings.integrator,
-        step=solver_settings.step,
+        mode=assembly.mode,
+        integrator=settings.integrator,
+        step=settings.step,
         integrated=json.dumps(STATES),
         **comparison_texts,
     )
-    with_assumptions(labelled, assumptions(vehicle_assembly))
-    return _with_error(labelled, vehicle_assembly, solver_settings, channels) if error else labelled
+    with_assumptions(labelled, assumptions(assembly))
+    return _with_error(labelled, assembly, settings, channels) if error else labelled
 
 
 def run_with_drift(scene: Scene, engine: str, estimate_error: bool = False) -> Result:
@@ -141,6 +134,7 @@ def _with_longer_engine_step(run_with_settings: Callable[[Settings], Series], so
 
 
 def _series_of_run(times: np.ndarray, run_channels: Channels, channel_names: tuple[str, ...]) -> Series:
+    """Time series of the named channels of a run."""
     return Series(times, {name: run_channels[name][2] for name in channel_names})
 
 
@@ -263,6 +257,7 @@ def _force_channels(vehicle_assembly: Assembly, trajectory: Trajectory, input_va
 def _wheel_forces(
     vehicle_assembly: Assembly, states: np.ndarray, input_values: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Front and rear wheel force (n,) in N, positive up, from states and inputs."""
     p = vehicle_assembly.parameters
     if vehicle_assembly.mode not in ("free", "road"):
         assert input_values is not None

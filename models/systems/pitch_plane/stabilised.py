@@ -220,7 +220,7 @@ class StabiliserBench:
             "Kalman smoother": {"kalman_filter": {**filtered, "smoother": True}},
         }
 
-    def score(
+    def score_stabilisers(
         self, engine: str, other_engines: tuple[str, ...], failures: dict[str, str], report_progress: Progress
     ) -> list[FiguresRow]:
         """Run all stabilisers in an engine, and the free run and the accepted ones in the other engines. Returns a row

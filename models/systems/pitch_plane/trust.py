@@ -57,6 +57,7 @@ def small_errors(largest_pitch_error: float) -> Assumption:
 
 
 def _watched_allowed_error(largest_pitch_error: float, run_result: Result) -> Watched:
+    """The pitch error (rad) up to which a run is trusted, as the value that an assumption judges."""
     return {"allowed error": np.array([largest_pitch_error])}
 
 
@@ -165,6 +166,7 @@ def model_error_curve(
 def _growth_by_parameters(
     tangent_path: TangentPath, force_errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
 ) -> GrowthCurve:
+    """Pitch error over time that force errors (N) or wrong parameters cause along a path."""
     pushes = None if force_errors is None else force_errors[:, None, :]
     _, columns = tangent_path.propagate_errors(np.zeros((1, 8)), pushes, wrong_parameters)
     return GrowthCurve(tangent_path.times, np.abs(columns[:, 0, 3]))

@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 from models.core.assumptions import Assumption, Gaussian, Watched
 from models.core.result import Result
 from models.systems.ride.scene import RideScene
-from models.systems.ride.watched import AXES, GRAVITY, WatchedMotion, static_loads
+from models.systems.ride.watched import GRAVITY, ROTATION_AXES, WatchedMotion, static_loads
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.spatial import NO_LIMITS, Curve, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import linearise
@@ -87,6 +87,7 @@ def _tyre_assumptions(vehicle: SpatialVehicle, values_of_motion: ValuesByName) -
 
 
 def _with_static_load(dynamic_loads: np.ndarray | Gaussian, static_load: float) -> np.ndarray | Gaussian:
+    """Dynamic tyre loads (N) with the static load (N) added."""
     return (
         replace(dynamic_loads, mean=dynamic_loads.mean + static_load)
         if isinstance(dynamic_loads, Gaussian)
@@ -95,7 +96,7 @@ def _with_static_load(dynamic_loads: np.ndarray | Gaussian, static_load: float) 
 
 
 def _angle_assumptions(vehicle: SpatialVehicle, values_of_motion: ValuesByName) -> Iterator[Assumption]:
-    turning = [(body.name, f) for body in vehicle.bodies for f in body.freedoms if f in AXES]
+    turning = [(body.name, f) for body in vehicle.bodies for f in body.freedoms if f in ROTATION_AXES]
     if turning:
         names = {"rx": "roll", "ry": "pitch", "rz": "yaw"}
         yield Assumption(

@@ -21,7 +21,7 @@ from models.road.excitation import Excitation
 from models.systems.ride.of_scene import LinearVehicleAtSpeed
 from models.vehicles.linear_vehicle import LinearVehicle
 
-CHECKED_SPEEDS = 3
+CHECKED_SPEED_COUNT = 3
 """Number of speeds of a sweep at which the solution is repeated with changed matrices."""
 MATRIX_ACCURACY, CORNERED_LAW_ACCURACY = 4.0 * float(np.finfo(float).eps), 1e-11
 """Relative accuracy of the vehicle's matrices: from formulas or an engine's smooth force laws, and from an engine's
@@ -60,6 +60,7 @@ def with_changed_last_digits(
 
 
 def _symmetrised(matrix: np.ndarray) -> np.ndarray:
+    """Symmetric part of a matrix."""
     return (matrix + matrix.T) / 2.0
 
 
@@ -75,7 +76,7 @@ def with_error_of_sweep(
 
     matrix_accuracy : relative accuracy of the entries of the vehicle's matrices.
     """
-    checked_speeds = np.unique(np.linspace(0, len(sweep_by_speed.speeds) - 1, CHECKED_SPEEDS).round().astype(int))
+    checked_speeds = np.unique(np.linspace(0, len(sweep_by_speed.speeds) - 1, CHECKED_SPEED_COUNT).round().astype(int))
     recomputed = np.array(
         [
             [

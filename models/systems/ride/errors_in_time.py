@@ -28,11 +28,11 @@ from models.systems.ride.scene import RideScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 
-DRIVE_ORDER = 10
+DRIVE_ERROR_ORDER = 10
 """Order of convergence of the covariance along a drive, in the length of its steps."""
-SPEED_BY_SPEED = ", each speed by itself"
+EACH_SPEED_ALONE_TEXT = ", each speed by itself"
 """Ending of the names of quasi-stationary channels."""
-COPIES_ORDER = 4
+COPIES_ERROR_ORDER = 4
 """Order of convergence of the copies' standard deviations, in the time step."""
 LEAST_ERROR_OF_NEGLECTED_SHARE = 0.25
 """Least relative error of a standard deviation by statistical linearisation, divided by the share of its variance that
@@ -69,7 +69,7 @@ def with_error_of_drive(
     def series(time_rows: np.ndarray, deviation: np.ndarray, quasi_stationary_rows: np.ndarray) -> Series:
         channels = {str(name): deviation[:, i] for i, name in enumerate(drive.names) if shown[i]}
         speed_by_speed = {
-            f"{name}{SPEED_BY_SPEED}": quasi_stationary_rows[:, i]
+            f"{name}{EACH_SPEED_ALONE_TEXT}": quasi_stationary_rows[:, i]
             for i, name in enumerate(drive.names)
             if np.isfinite(quasi_stationary_rows[:, i]).all()
         }
@@ -94,13 +94,13 @@ def with_error_of_drive(
         return series(coarse.time[rows], coarse.deviation[rows], quasi_stationary_of(stride)[::stride][: len(wanted)])
 
     units = dict(zip(run_result["output"].tolist(), run_result["unit"].tolist(), strict=True))
-    units |= {f"{name}{SPEED_BY_SPEED}": unit for name, unit in units.items()}
+    units |= {f"{name}{EACH_SPEED_ALONE_TEXT}": unit for name, unit in units.items()}
     fine = series(drive.time, drive.deviation, run_result["quasi_stationary"])._replace(units=units)
     return with_estimated_errors(
         run_result,
         fine,
         rerun,
-        DRIVE_ORDER,
+        DRIVE_ERROR_ORDER,
         step,
         channel_sizes={
             name: root_mean_square(quasi_stationary_rows) for name, quasi_stationary_rows in fine.channels.items()
@@ -157,6 +157,7 @@ def with_error_of_copies(
 
 
 def _rms_over_speeds(deviation_rows: Sequence[np.ndarray]) -> np.ndarray:
+    """Root mean square over the rows, one for each speed."""
     with np.errstate(invalid="ignore"):
         return np.nan_to_num(np.sqrt(np.mean(np.square(deviation_rows), axis=0)))
 
@@ -174,7 +175,7 @@ def _step_errors(
     deviation = np.sqrt(fine_copies.about_mean()[:count].mean(axis=0))
     coarse, coarser = np.sqrt(twice.mean(axis=0)), np.sqrt(fourfold.mean(axis=0))
     pairs = zip(abs(deviation - coarse), abs(coarse - coarser), strict=True)
-    order = np.array([observed_order(float(a), float(b), COPIES_ORDER) for a, b in pairs])
+    order = np.array([observed_order(float(a), float(b), COPIES_ERROR_ORDER) for a, b in pairs])
     return abs(deviation - coarse) / (2.0**order - 1.0), order
 
 

@@ -19,7 +19,7 @@ from models.systems.ride.of_scene import vehicle_of
 from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import SpatialVehicle
 
-AXES = "x forward, y left, z up from the ground; the frame moves with the vehicle; zero is the design position."
+AXES_TEXT = "x forward, y left, z up from the ground; the frame moves with the vehicle; zero is the design position."
 
 
 def exported(scene: RideScene, engine: str) -> Exported:
@@ -33,7 +33,7 @@ def exported(scene: RideScene, engine: str) -> Exported:
         *(f"drag of {drag.body!r}" for drag in vehicle.drags),
     ]
     still = replace(vehicle, side_forces=(), drags=(), outputs=())
-    subject = ExportSubject(scene.title, scene.file, AXES)
+    subject = ExportSubject(scene.title, scene.file, AXES_TEXT)
     return (_in_exudyn if engine == "exudyn" else _in_mujoco)(still, subject, by_speed)
 
 

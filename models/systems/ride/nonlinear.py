@@ -159,9 +159,9 @@ class CopiesJob:
     speeds: tuple[float, ...]
     sampling: RunSampling
 
-    def __call__(self, speed_indices: range) -> ArraysByName:
+    def __call__(self, paths: range) -> ArraysByName:
         """Returns the fields of ``Copies`` as arrays, with the speed as their first axis."""
-        copies_of_speeds = [self._copies_at_speed(self.speeds[i]) for i in speed_indices]
+        copies_of_speeds = [self._copies_at_speed(self.speeds[i]) for i in paths]
         return {
             name: np.array([getattr(copies_at_speed, name) for copies_at_speed in copies_of_speeds])
             for name in Copies.__dataclass_fields__

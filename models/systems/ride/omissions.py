@@ -19,8 +19,8 @@ SIMILAR_STIFFNESS_FACTOR = 2.0
 """Largest ratio of two stiffnesses in a group of bushings that are made rigid together, and ratio of a bushing's to the
 softest stiffness between the same bodies that it must exceed.
 """
-ALL_WHEELS = "mass of all wheels"
-TYRE_DAMPING = "tyre damping"
+ALL_WHEELS_EFFECT = "mass of all wheels"
+TYRE_DAMPING_EFFECT = "tyre damping"
 """Names of effects to which other effects refer."""
 LAW_TEXTS = {"travel_force": "curves over travel", "rate_force": "curves over rate", "friction": "friction"}
 """Nonlinear laws of springs, and the name of the effect that replaces them in all springs: stops, curved dampers, dry
@@ -52,6 +52,7 @@ def effects_of(reduced_scene: ReducedScene) -> tuple[OmissibleEffect, ...]:
 
 
 def _without_table(reduced_scene: ReducedScene, table_name: str) -> ReducedScene:
+    """Returns the scene without one of its tables [effects.NAME]."""
     return reduced_scene.without_tables(table_name)
 
 
@@ -80,6 +81,7 @@ def anti_roll_bar_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
 
 
 def _without_bar(reduced_scene: ReducedScene, bar_name: str) -> ReducedScene:
+    """Returns the scene without an anti-roll bar."""
     bars = tuple(kept_bar for kept_bar in reduced_scene.vehicle.bars if kept_bar.name != bar_name)
     return replace(reduced_scene, vehicle=replace(reduced_scene.vehicle, bars=bars))
 
@@ -102,7 +104,7 @@ def body_mass_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
         white = reduced_scene.ride_scene.road.cutoff is None and any(
             t.damping and t.body in massless_bodies for t in vehicle.tyres
         )
-        needs = (TYRE_DAMPING,) if white else ()
+        needs = (TYRE_DAMPING_EFFECT,) if white else ()
         why = "for the road's white noise would reach a body without mass" if white else "one names the other's bodies"
         says = f"{', '.join(massless_bodies)} without mass"
         return OmissibleEffect(
@@ -115,8 +117,8 @@ def body_mass_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
             is_singular=True,
         )
 
-    effects = [effect(ALL_WHEELS, sorted(wheels), tuple(groups))]
-    effects += [effect(name, bodies, (ALL_WHEELS,)) for name, bodies in groups.items() if len(axles) > 1]
+    effects = [effect(ALL_WHEELS_EFFECT, sorted(wheels), tuple(groups))]
+    effects += [effect(name, bodies, (ALL_WHEELS_EFFECT,)) for name, bodies in groups.items() if len(axles) > 1]
     carriers = wheels | {body.parent for body in vehicle.bodies}
     largest_light_mass = LIGHT_BODY_SHARE * sum(body.mass for body in vehicle.bodies)
     light = [body.name for body in vehicle.bodies if body.name not in carriers and body.mass < largest_light_mass]
@@ -147,10 +149,12 @@ def rigid_bushing_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
 
 
 def _stiffness(spring: SpringDamper) -> float:
+    """Stiffness (N/m) of a spring at rest."""
     return slopes_at_rest(spring)[0]
 
 
 def _rigid_bushings(springs: list[SpringDamper]) -> OmissibleEffect:
+    """Returns the effect that makes some bushings rigid."""
     names = [spring.name for spring in springs]
     names_text = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
     bodies = {body for spring in springs for body in (spring.first_body, spring.second_body)}
@@ -237,7 +241,7 @@ def second_corner_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
     """
     if reduced_scene.ride_scene.road.cutoff is None:
         return []
-    needs = (TYRE_DAMPING,) if any(tyre.damping for tyre in reduced_scene.vehicle.tyres) else ()
+    needs = (TYRE_DAMPING_EFFECT,) if any(tyre.damping for tyre in reduced_scene.vehicle.tyres) else ()
     says, why = "road filters of first order", "for it would pass white noise"
     return [OmissibleEffect("second corner of the road", partial(on_road, cutoff=None), says, needs, why=why)]
 
@@ -256,7 +260,9 @@ def second_track_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
 def tyre_damping_effects(reduced_scene: ReducedScene) -> list[OmissibleEffect]:
     """Returns the effect that leaves out the damping of tyres; none where no tyre is damped."""
     damped = any(tyre.damping for tyre in reduced_scene.vehicle.tyres)
-    return [OmissibleEffect(TYRE_DAMPING, _without_damping, "tyres are springs without damping")] if damped else []
+    return (
+        [OmissibleEffect(TYRE_DAMPING_EFFECT, _without_damping, "tyres are springs without damping")] if damped else []
+    )
 
 
 def _without_damping(reduced_scene: ReducedScene) -> ReducedScene:

@@ -119,7 +119,7 @@ def undamped_frequencies(vehicle: SpatialVehicle) -> list[float]:
 
 USUAL_FREQUENCIES = (0.2, 500.0)
 """Lowest and highest natural frequency (Hz) of road vehicles, from a soft body to the stiffest mount."""
-FREE_FREQUENCY = 1e-4
+LARGEST_FREE_FREQUENCY = 1e-4
 """Frequency (Hz) below which a motion counts as free of restoring forces."""
 
 
@@ -130,7 +130,7 @@ def frequency_doubts(vehicle: SpatialVehicle) -> list[str]:
     odd = [
         f
         for f in undamped_frequencies(vehicle)
-        if f > FREE_FREQUENCY and not USUAL_FREQUENCIES[0] <= f <= USUAL_FREQUENCIES[1]
+        if f > LARGEST_FREE_FREQUENCY and not USUAL_FREQUENCIES[0] <= f <= USUAL_FREQUENCIES[1]
     ]
     if not odd:
         return []

@@ -18,7 +18,7 @@ from models.systems.ride.errors import CORNERED_LAW_ACCURACY, MATRIX_ACCURACY, w
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, needs_run_in_time, scene_errors, vehicle_of
 from models.systems.ride.scene import RideScene
 from models.systems.ride.watched import (
-    JUDGED_SPEEDS,
+    JUDGED_SPEED_COUNT,
     MotionAlongDrive,
     SpectralMotion,
     checked_speeds,
@@ -34,7 +34,7 @@ CORRELATIONS_AS_WRITTEN = "as in the scene"
 """Name of the scene's correlation of the road in a result."""
 ARBITRARY_SPEED = 1.0
 """Speed (m/s) at which a vehicle of a drive at varying speed is linearised: its matrices do not depend on the speed."""
-QUASI_STATIONARY_SPEEDS = 90
+QUASI_STATIONARY_SPEED_COUNT = 90
 """Number of constant speeds, from standstill on, between which quasi-stationary deviations of a drive are
 interpolated.
 """
@@ -141,7 +141,7 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, es
     start_time, weightings = time.process_time(), scene.weighting
     linear, road = linear_vehicle(vehicle, engine)(ARBITRARY_SPEED), excitation_of(scene, wheels(vehicle))
     drive = varying_speed(linear, road, scene.drive.profile(scene.file), weightings=weightings)
-    speeds = np.linspace(0.0, drive.speed.max(), QUASI_STATIONARY_SPEEDS)
+    speeds = np.linspace(0.0, drive.speed.max(), QUASI_STATIONARY_SPEED_COUNT)
     quasi_stationary_deviations = quasi_stationary(linear, road, speeds, weightings=weightings)
 
     def deviations_along(steps_per_row: int) -> np.ndarray:
@@ -172,7 +172,11 @@ def _drive_deviations(scene: RideScene, engine: str, vehicle: SpatialVehicle, es
         detail=drive,
     )
     spectral = SpectralMotion(
-        vehicle, lambda _: linear, road, checked_speeds(np.linspace(0.0, drive.speed.max(), JUDGED_SPEEDS + 1)[1:]), {}
+        vehicle,
+        lambda _: linear,
+        road,
+        checked_speeds(np.linspace(0.0, drive.speed.max(), JUDGED_SPEED_COUNT + 1)[1:]),
+        {},
     )
     with_assumptions(
         labelled, assumptions(scene, vehicle, MotionAlongDrive(watched_deviations(vehicle, drive.deviation), spectral))

@@ -18,9 +18,9 @@ from models.vehicles.linear_vehicle import LinearVehicle, Output
 from models.vehicles.spatial import PartOutput, PointOutput, SpatialOutput, SpatialVehicle, TurnOutput, TyreOutput
 from models.vehicles.spatial_linear import linearise, outputs, preloads
 
-AXES = {"rx": (1.0, 0.0, 0.0), "ry": (0.0, 1.0, 0.0), "rz": (0.0, 0.0, 1.0)}
+ROTATION_AXES = {"rx": (1.0, 0.0, 0.0), "ry": (0.0, 1.0, 0.0), "rz": (0.0, 0.0, 1.0)}
 """Axis of each rotational degree of freedom."""
-JUDGED_SPEEDS = 5
+JUDGED_SPEED_COUNT = 5
 """Number of speeds of a sweep at which assumptions are checked, the slowest and the fastest among them."""
 
 
@@ -36,19 +36,21 @@ def watched_outputs(vehicle: SpatialVehicle) -> tuple[SpatialOutput, ...]:
     """Returns the outputs of a vehicle on which assumptions are checked: tyre forces without the static load, travels
     of springs and their rates, angles of bodies and, where tyres have side forces, the components of their slip.
     """
-    turning = [(body.name, f) for body in vehicle.bodies for f in body.freedoms if f in AXES]
+    turning = [(body.name, f) for body in vehicle.bodies for f in body.freedoms if f in ROTATION_AXES]
     watched_list: list[SpatialOutput] = [
         TyreOutput(f"load {tyre.name}", "tyre force", tyre.name) for tyre in vehicle.tyres
     ]
     watched_list += [PartOutput(f"travel {spring.name}", "travel", spring.name) for spring in vehicle.springs]
     watched_list += [PartOutput(f"rate {spring.name}", "travel rate", spring.name) for spring in vehicle.springs]
-    watched_list += [TurnOutput(f"{freedom} {body}", "angle", body, AXES[freedom]) for body, freedom in turning]
+    watched_list += [
+        TurnOutput(f"{freedom} {body}", "angle", body, ROTATION_AXES[freedom]) for body, freedom in turning
+    ]
     for force in vehicle.side_forces:
         watched_list.append(
             PointOutput(f"side velocity {force.name}", "velocity", force.body, force.point, (0.0, 1.0, 0.0))
         )
-        watched_list.append(TurnOutput(f"roll {force.name}", "angle", force.chassis, AXES["rx"]))
-        watched_list.append(TurnOutput(f"yaw {force.name}", "angle", force.chassis, AXES["rz"]))
+        watched_list.append(TurnOutput(f"roll {force.name}", "angle", force.chassis, ROTATION_AXES["rx"]))
+        watched_list.append(TurnOutput(f"yaw {force.name}", "angle", force.chassis, ROTATION_AXES["rz"]))
     return tuple(watched_list)
 
 
@@ -62,6 +64,7 @@ def watched_vehicle(linear_vehicle: LinearVehicle, vehicle: SpatialVehicle, spee
 
 
 def _slip_outputs(vehicle: SpatialVehicle, outputs: tuple[Output, ...], speed: float) -> Iterator[Output]:
+    """Yields the slip angle (rad) at a speed (m/s) of every tyre with a side force, as an output."""
     named = {row.name: row for row in outputs}
     for force in vehicle.side_forces:
         side, roll, yaw = (named[f"{quantity_name} {force.name}"] for quantity_name in ("side velocity", "roll", "yaw"))
@@ -79,9 +82,11 @@ def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
 
 
 def checked_speeds(speeds: Sequence[float] | np.ndarray) -> list[float]:
-    """Returns at most JUDGED_SPEEDS of the speeds (m/s), evenly chosen, with the slowest and the fastest."""
+    """Returns at most JUDGED_SPEED_COUNT of the speeds (m/s), evenly chosen, with the slowest and the fastest."""
     rising = np.unique(np.asarray(speeds, float))
-    return [float(rising[i]) for i in np.unique(np.linspace(0, len(rising) - 1, JUDGED_SPEEDS).round().astype(int))]
+    return [
+        float(rising[i]) for i in np.unique(np.linspace(0, len(rising) - 1, JUDGED_SPEED_COUNT).round().astype(int))
+    ]
 
 
 @dataclass(frozen=True)

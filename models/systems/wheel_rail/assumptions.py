@@ -46,6 +46,8 @@ def _extreme_of_patches(
 
 
 def _half_space_assumption() -> Assumption:
+    """Assumption that contact patches are small beside the bodies' radii of curvature."""
+
     def share(patch_report: PatchReport) -> float:
         return max(
             0.5 * patch_report.length * patch_report.curvature_x, 0.5 * patch_report.width * patch_report.curvature_y
@@ -86,6 +88,7 @@ def _profile_bounds_assumption(scene: WheelRailScene) -> Assumption:
 
 
 def _elastic_assumption() -> Assumption:
+    """Assumption that pressures stay within the elastic range of the steel."""
     return Assumption(
         "elastic",
         "the steel does not flow",

@@ -70,14 +70,14 @@ def run(
     scene: WheelRailScene,
     engine: str = "",
     case: str = "",
-    report_progress: Callable[[float, float], Any] = lambda shift, share: None,
+    progress: Callable[[float, float], Any] = lambda shift, share: None,
     *,
     error: bool = False,
 ) -> Result:
     """Compute a case, by default the first, at every position of the wheelset; the detail is its ``ContactsOfCase``.
 
     Channels of positions lie over the shift, those of patches over shift, wheel and patch, the patch with the largest
-    load first; not a number where there is no further patch. Positions that fail are doubts. report_progress : called
+    load first; not a number where there is no further patch. Positions that fail are doubts. progress : called
     before each shift with the shift (mm) and the completed share; error : whether every other position is computed on
     half the cells, too, from which the error of the cells is estimated. Raises InputError for files that are no
     profiles.
@@ -85,7 +85,7 @@ def run(
     name = case or next(iter(scene.cases))
     contact, yaw, contacts = scene.contact(scene.cases[name]), scene.cases[name].yaw, ContactsOfCase()
     for i, shift in enumerate(scene.positions.values().tolist()):
-        report_progress(1e3 * shift, i / scene.positions.count)
+        progress(1e3 * shift, i / scene.positions.count)
         start_time = time.process_time()
         try:
             contacts.placements.append(contact.at(shift, yaw * shift))

@@ -79,7 +79,7 @@ def sums_by_wheel(contact_records: Array, patch_values: Array) -> dict[str, Arra
     }
 
 
-def _watch_of_path(values_of_path: Callable[[WheelsetPath], Watched]) -> Callable[[Result], Watched]:
+def _values_of_path_function(values_of_path: Callable[[WheelsetPath], Watched]) -> Callable[[Result], Watched]:
     """Returns a function of a result that applies ``values_of_path`` to its path; the result's detail is a path or a
     limit cycle.
     """
@@ -92,7 +92,7 @@ def _watch_of_path(values_of_path: Callable[[WheelsetPath], Watched]) -> Callabl
     return of_result
 
 
-def _watch_of_patches(values_of_contacts: Callable[[Array], Array]) -> Callable[[Result], Watched]:
+def _values_of_contacts_function(values_of_contacts: Callable[[Array], Array]) -> Callable[[Result], Watched]:
     """Returns a function of a result that gives, for each wheel and time, the largest magnitude of
     ``values_of_contacts`` among its loaded patches, 0 where no patch is loaded.
     """
@@ -105,7 +105,7 @@ def _watch_of_patches(values_of_contacts: Callable[[Array], Array]) -> Callable[
             "left wheel": values[:, patches_per_wheel:].max(axis=1),
         }
 
-    return _watch_of_path(of_path)
+    return _values_of_path_function(of_path)
 
 
 def _wheel_load_assumption(wheelset: Wheelset) -> Assumption:
@@ -113,7 +113,7 @@ def _wheel_load_assumption(wheelset: Wheelset) -> Assumption:
         "wheels press",
         "both wheels stay on their rails",
         "start with a smaller displacement, or travel below the critical speed",
-        _watch_of_path(
+        _values_of_path_function(
             lambda path: sums_by_wheel(path.contacts, path.contacts["load"] * np.cos(path.contacts["angle"]))
         ),
         "N",
@@ -126,7 +126,7 @@ def _small_yaw_assumption() -> Assumption:
         "small yaw",
         "the yaw is so small that a contact's curvatures are those without it",
         "start with a smaller displacement or yaw, or stiffen stiffness_x",
-        _watch_of_path(lambda path: {"axle": path.states[:, YAW]}),
+        _values_of_path_function(lambda path: {"axle": path.states[:, YAW]}),
         "rad",
         -LARGEST_YAW,
         LARGEST_YAW,
@@ -157,7 +157,7 @@ def _half_space_assumption() -> Assumption:
         "half-space",
         "contacts are small beside the radii of wheel and rail",
         "lower the load, or use profiles whose radii are larger",
-        _watch_of_patches(watched),
+        _values_of_contacts_function(watched),
         "of the radius",
         upper_limit=LARGEST_AXIS_SHARE,
     )
@@ -172,7 +172,7 @@ def _elastic_assumption() -> Assumption:
         "elastic",
         "the steel does not flow",
         "lower the load or the displacement: real contacts would be larger, and their pressure lower",
-        _watch_of_patches(watched),
+        _values_of_contacts_function(watched),
         "MPa",
         upper_limit=1e-6 * YIELD_PRESSURE,
     )
@@ -184,7 +184,7 @@ def _slow_slip_assumption(equations: Equations) -> Assumption:
         "constant friction",
         "friction is the same however fast the wheels slip",
         "give wheelset.override.friction as it is for such slip, or travel slower",
-        _watch_of_patches(lambda contacts: speed * np.hypot(contacts["xi_x"], contacts["xi_y"])),
+        _values_of_contacts_function(lambda contacts: speed * np.hypot(contacts["xi_x"], contacts["xi_y"])),
         "m/s",
         upper_limit=FAST_SLIP,
     )
@@ -201,7 +201,7 @@ def _no_slip_assumption(wheelset: Wheelset) -> Assumption:
         "no slip",
         "the creep forces of the linear law are far below mu N",
         'name the effect fastsim: contact.law = "fastsim"',
-        _watch_of_path(watched),
+        _values_of_path_function(watched),
         "mu N",
         upper_limit=LINEAR_FORCE_SHARE,
     )
@@ -220,7 +220,7 @@ def _travel_assumption(wheelset: Wheelset) -> Assumption:
         "suspension",
         "springs and dampers of the suspension are lines",
         "stiffen the suspension: real guides have stops",
-        _watch_of_path(watched),
+        _values_of_path_function(watched),
         "mm",
         upper_limit=1e3 * LARGEST_TRAVEL,
     )
@@ -235,7 +235,7 @@ def _climbing_assumption(wheelset: Wheelset) -> Assumption:
         "no flange climbs",
         "no flange is pushed so hard that it climbs (Nadal, 70 degrees)",
         "name the effect profiles, which show it",
-        _watch_of_path(watched),
+        _values_of_path_function(watched),
         "of the wheel's load",
         upper_limit=max(0.0, nadal_limit(wheelset.friction)),
     )
@@ -248,7 +248,7 @@ def _flange_deflection_assumption(
         "on the tread",
         "the wheels roll on their cones, and a flange's rail gives way by a few mm at most",
         "name the effect profiles, which have flanges of their own",
-        values_of_result or _watch_of_path(lambda path: {"wheelset": np.abs(path.states[:, Y])}),
+        values_of_result or _values_of_path_function(lambda path: {"wheelset": np.abs(path.states[:, Y])}),
         "m",
         upper_limit=wheelset.flange_clearance + LARGEST_FLANGE_DEFLECTION,
     )
@@ -277,7 +277,7 @@ def _profile_bounds_assumption(wheelset: Wheelset) -> Assumption:
         "within the profiles",
         "contacts lie within the profiles, below the flange's tip",
         "start with a smaller displacement, or use longer profiles",
-        _watch_of_path(watched),
+        _values_of_path_function(watched),
         "mm",
         lower_limit=0.0,
     )

@@ -76,9 +76,12 @@ def equations_of(scene: WheelsetScene, engine: str, speed: float) -> Equations:
 
 
 @lru_cache(32)
-def _initial_state(
+def _equations_and_state(
     engine: str, wheelset: Wheelset, speed: float, creep_law: Any, cell_count: int, lateral_shift: float, yaw: float
 ) -> tuple[Equations, np.ndarray]:
+    """Equations of motion in an engine, and the state (10,) at rest on the rails with a lateral displacement (m) and a
+    yaw (rad).
+    """
     equations = equations_class(engine)(wheelset, speed, creep_law, cell_count)
     state = equations.displaced_state(lateral_shift)
     state[YAW] = yaw
@@ -90,7 +93,9 @@ def equations_and_start(scene: WheelsetScene, engine: str, speed: float) -> tupl
     cached for further paths.
     """
     contact, run = scene.contact, scene.run
-    return _initial_state(engine, wheelset_of(scene), speed, contact.law, contact.cells, run.displacement, run.yaw)
+    return _equations_and_state(
+        engine, wheelset_of(scene), speed, contact.law, contact.cells, run.displacement, run.yaw
+    )
 
 
 def path_speeds(scene: WheelsetScene) -> list[float]:

@@ -53,7 +53,7 @@ CONTACT_CHANNELS = {
 SPEED: SoughtQuantity = "speed"
 AMPLITUDE: SoughtQuantity = "amplitude"
 """Unknown that is solved for in a limit cycle: the speed along a branch, the amplitude at a given speed."""
-PAIRS_OF_MARCHES = 11
+TIMED_MARCH_PAIR_COUNT = 11
 """Pairs of simulated periods, displaced to both sides, whose differences linearise a limit cycle; worker processes
 share them.
 """
@@ -191,7 +191,7 @@ def branch_result(
     """
     speeds, orbits, why, unknown = scene.speeds.all(), list[Orbit](), list[str](), SPEED
     equations = equations_of(scene, "reference", float(speeds[-1]))
-    with Crew.of(scene, default_workers=1).at_work(PAIRS_OF_MARCHES, *folders_for_workers(scene)) as pool:
+    with Crew.of(scene, default_workers=1).at_work(TIMED_MARCH_PAIR_COUNT, *folders_for_workers(scene)) as pool:
         try:
             for orbit in bifurcation(equations, float(speeds.min()), float(speeds.max()), scene.run.step, pool):
                 orbits.append(orbit)
@@ -239,6 +239,7 @@ def _cycle_reached_at_speed(scene: WheelsetScene, speed: float) -> Orbit | None:
 
 
 def _attained_in_engine(scene: WheelsetScene, speed: float) -> Orbit | None:
+    """Returns the limit cycle that a motion in the reference reaches at a speed (m/s), or None where it dies out."""
     return attained_cycle(
         equations_of(scene, "reference", speed), initial_displacement=scene.run.displacement, time_step=scene.run.step
     )

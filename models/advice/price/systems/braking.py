@@ -24,7 +24,7 @@ FIRST_REFERENCE_SUBSTEPS, REFERENCE_RUNGS = 8, 8
 """Number of steps within a sample on the reference's first rung, and the number of its rungs."""
 USUAL_QUANTITY = "stopping_distance"
 QUANTITIES: dict[str, tuple[Any, str]] = {
-    "stopping_distance": (lambda path: StopHistory(path).way[-1], "m"),
+    "stopping_distance": (lambda path: StopHistory(path).distance_travelled[-1], "m"),
     "stopping_time": (lambda path: path.times[-1], "s"),
     "aside": (lambda path: path.states[-1, 0, 1], "m"),
     "yaw": (lambda path: path.states[-1, 0, 2], "rad"),

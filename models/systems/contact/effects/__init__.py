@@ -40,12 +40,18 @@ def _theory_effect(
 
 
 def _method_without_shape(scene: Any) -> dict[str, str]:
+    """[method] of a scene without the shape of its contact; raises InputError for profiles, which have no cheaper
+    theory.
+    """
     if scene.profiles is not None:
         raise InputError(scene.file, "method.name", "simplified", "is the cheapest theory of profiles: leave it in")
     return {}
 
 
 def _method_without_half_space(scene: Any) -> dict[str, str]:
+    """[method] of the cheapest theory that is no half-space: FASTSIM on an ellipse, the simplified theory on
+    profiles.
+    """
     return {"name": "fastsim" if scene.profiles is None else "simplified"}
 
 
@@ -59,6 +65,7 @@ def _naming_theory(theory_name: str) -> Callable[[Table, Any], None]:
 
 
 def _without_slip(scene_tables: Table, scene: Any) -> None:
+    """Edit a scene: use the linear theory, which has no slip. Raises InputError for profiles."""
     if scene.profiles is not None:
         allowed = "cannot be left out on profiles: the linear theory needs an ellipse"
         raise InputError(scene.file, "method.name", scene.method.name, allowed)
@@ -66,6 +73,7 @@ def _without_slip(scene_tables: Table, scene: Any) -> None:
 
 
 def _without_profiles(scene_tables: Table, scene: Any) -> None:
+    """Raise InputError: profiles can only give way to an ellipse, which the user must describe."""
     allowed = "can only give way to an ellipse: name ellipse, curvatures or radii"
     raise InputError(scene.file, "profiles", None, allowed)
 
@@ -76,6 +84,7 @@ def _spin_is_swept(scene: Any) -> bool:
 
 
 def _without_spin(scene_tables: Table, scene: Any) -> None:
+    """Edit a scene: remove the spin. Raises InputError where the sweep varies it."""
     if _spin_is_swept(scene):
         allowed = "is what this scene asks for: sweep another creepage to leave it out"
         raise InputError(scene.file, "sweep.of", "spin", allowed)

@@ -123,6 +123,7 @@ def _balance_assumptions(axle_forces: "AxleForces", force_parameters: Parameters
 
 
 def _steady_accelerations(steady_acceleration: float, run_result: Result) -> Watched:
+    """The steady acceleration of the chassis by the mean wheel forces, as the value that an assumption judges."""
     return {"chassis": np.array([steady_acceleration])}
 
 

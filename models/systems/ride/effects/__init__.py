@@ -50,11 +50,13 @@ def _straighten_curves(scene_tables: Table, scene: Any) -> None:
 
 
 def _take_papers_road(scene_tables: Table, scene: Any) -> None:
+    """Edit a scene: remove the measured road, so that the road has the published spectrum."""
     for key in ("file", "track_width", "first", "last"):
         scene_tables["road"].pop(key, None)
 
 
 def _hold_mean_speed(scene_tables: Table, scene: Any) -> None:
+    """Edit a scene: replace the drive by its mean speed, constant."""
     drive = scene_tables.pop("drive")
     drive_times, speeds = drive["time"], drive["speed"]
     driven_distance = sum(
