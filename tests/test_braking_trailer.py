@@ -62,7 +62,7 @@ def test_loads_are_those_of_levers_and_a_locked_train_stops_by_friction_alone():
 @pytest.mark.grounds("closed form")
 def test_a_caravan_that_brakes_alone_pulls_as_its_levers_say_and_brakes_that_hold_on_to_the_car_are_seen():
     errors = closed.caravan_errors()
-    assert max(abs(error) for error in (errors.deceleration, errors.load, errors.pull)) < 1e-3
+    assert max(abs(error) for error in (errors.deceleration, errors.axle_load, errors.ball_force)) < 1e-3
     wrong = closed.relative_difference(
         closed.caravan_run(closed.plant_brakes_on_car, 2.5), closed.caravan_closed_form()
     )

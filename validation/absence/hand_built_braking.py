@@ -282,7 +282,7 @@ def advance_in_substeps(substep_count, truck_state, torques, step, truck, worksp
         for c in range(REPORT_SIZE):
             for i in range(4):
                 sums[c, i] += rows[c, i]
-        if used < step_part.time:
+        if used < step_part.duration:
             return time
     report, locked = report_of(rows), report_of(sums).locked
     for c in range(REPORT_SIZE):

@@ -48,7 +48,7 @@ class AdvancedVehicle(RollingTruck):
         steer: float = 0.0,
     ) -> None:
         go = advance if implementation == "reference" else EngineChassis(implementation, plane_vehicle).advance
-        super().__init__(on_road(plane_vehicle, stacked_tables(tyre_table), road), speed, steer=steer, step_function=go)
+        super().__init__(on_road(plane_vehicle, stacked_tables(tyre_table), road), speed, steer=steer, advance_step=go)
         self.implementation = implementation
         if rim_turning is not None:
             self.turning[:] = rim_turning

@@ -84,7 +84,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
             rows += _same_pendulum_rows(family, mechanism, output, model.with_name("Revolute_Case01.csv.gz"))
         saved[family] = {
             "lost": output.energy_lost(mechanism) if not mechanism.springs else None,
-            "digits": output.digits,
+            "digits": output.digit_count,
         }
     return rows, saved
 

@@ -151,7 +151,7 @@ def _planted_fault_rows() -> list[Row]:
     seen = {
         "brakes": (
             "brakes of the caravan hold on to the car, by the load of its axle",
-            abs(pulled.load) > STATICS_TOLERANCE,
+            abs(pulled.axle_load) > STATICS_TOLERANCE,
         ),
         "heading": ("wheels of the caravan keep to the car's heading, by plain code", apart > 1e-12),
     }

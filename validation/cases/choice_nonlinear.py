@@ -211,8 +211,8 @@ def _summary_of_choice(judged_choice: ChoiceCheckedByRuns) -> Saved:
     return {
         "system": judged_choice.system,
         "engine": judged_choice.engine,
-        "tolerance": judged_choice.asked.tolerance,
-        "quantities": list(judged_choice.asked.quantities),
+        "tolerance": judged_choice.question.tolerance,
+        "quantities": list(judged_choice.question.quantities),
         "left out": list(choice.left_out),
         "times": choice.step_factor,
         "predicted": choice.predicted_change.tolist(),

@@ -43,13 +43,13 @@ class TheoryErrors:
     """Forces of a contact theory and their errors against the exact theory: force (n, 2) divided by mu N, moment (n,)
     divided by mu N times the longer semi-axis.
 
-    force_error, moment_error (n,) : of force and moment, in the same units; spin_share (n,) : share of spin in the
+    error, moment_error (n,) : of force and moment, in the same units; spin_share (n,) : share of spin in the
     creepage; group_number (n,) : numbers by ``groups_of_contacts``.
     """
 
     force: Array
     moment: Array
-    force_error: Array
+    error: Array
     moment_error: Array
     spin_weight_of_motion: Array
     group_number: Array
@@ -131,7 +131,7 @@ def shares_within_bands(theory_name: str, theory_errors_of_contacts: TheoryError
     return (
         float(
             np.mean(
-                theory_errors_of_contacts.force_error
+                theory_errors_of_contacts.error
                 <= force_error_band(
                     theory_name, theory_errors_of_contacts.used_friction, theory_errors_of_contacts.spin_share
                 )

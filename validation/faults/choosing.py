@@ -46,7 +46,9 @@ def _linear_ride() -> LinearRide:
 @cache
 def _half_car_question() -> ChoiceQuestion:
     run = drawn_run("pitch-plane", HALF_CAR_SEED)
-    return replace(run, table={**run.table, "run": {**run.table["run"], "duration": 0.5}}, tolerance=TOLERANCE)
+    return replace(
+        run, scene_table={**run.scene_table, "run": {**run.scene_table["run"], "duration": 0.5}}, tolerance=TOLERANCE
+    )
 
 
 def _linear_choice_and_changes() -> tuple[RideChoice, np.ndarray, float]:

@@ -69,9 +69,9 @@ class Sender:
 
     numbers_per_path: int
 
-    def __call__(self, path_range: range) -> dict[str, np.ndarray]:
+    def __call__(self, paths: range) -> dict[str, np.ndarray]:
         """Array "x" (paths, numbers) of zeros."""
-        return {"x": np.zeros((len(path_range), self.numbers_per_path))}
+        return {"x": np.zeros((len(paths), self.numbers_per_path))}
 
     def facts(self) -> dict[str, Any]:
         """Settings on which the result of a block depends."""
