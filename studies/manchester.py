@@ -62,7 +62,7 @@ def run(
     results, failed, table = dict[str, Result](), dict[str, str](), list[str]()
     for k, (name, case) in enumerate(scene.cases.items()):
         result = results[name] = system.run(
-            scene, case=name, progress=partial(_report_progress, progress, scene, k), error=scene.error
+            scene, case=name, progress=partial(_report_progress, report_progress, scene, k), error=scene.error
         )
         contacts = result.detail
         failed |= {f"{name}, {shift:g} mm": why for shift, why in contacts.failures.items()}

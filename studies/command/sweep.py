@@ -116,6 +116,7 @@ class SweepJob:
 
 
 def _json_array(point_records: Iterable[PointRecord]) -> ArraysByName:
+    """Records as an array of JSON texts."""
     return {"record": np.array(list(map(json.dumps, point_records)))}
 
 

@@ -23,6 +23,8 @@ CELL, RADIUS, BALL_LOAD = 1.5e-4, 0.3, 1e4
 
 
 def _linear_theory_error(cell_count: int, march_name: MarchChoice) -> float:
+    """Relative error of FASTSIM's force at a small creepage, with a number of cells along each axis, against the linear
+    theory."""
     answer = fastsim(
         RollingEllipse(A, B, LOAD, MU, SMALL_CREEPAGE, 0.0, 0.0), MATERIAL_PAIR, cells=cell_count, march=march_name
     )

@@ -176,6 +176,8 @@ def _simplified(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
 
 
 def _rolled_by_theory(theory_class: Callable[..., RollingOnEllipse]) -> Callable[[ContactCase, int], ForcesOfMotion]:
+    """Returns a function that makes, for a case and a number of cells, the function of the creepages by a theory."""
+
     def rolled(contact_case: ContactCase, cell_count: int) -> ForcesOfMotion:
         contact = contact_case.contact(theory_class)
         return lambda motion: contact.roll(motion, cell_count)
@@ -257,6 +259,7 @@ LEAST_TIMED_SECONDS = 2e-5
 def _forces_and_seconds(
     forces_of_motion: ForcesOfMotion, motion: CreepagesAndSpin, repeat_count: int
 ) -> tuple[Any, float]:
+    """Forces of a motion, and median time (s) of one evaluation over the repeats."""
     start = time.perf_counter()
     answer = forces_of_motion(motion)
     count = max(1, int(LEAST_TIMED_SECONDS / max(time.perf_counter() - start, 1e-7)))

@@ -203,6 +203,7 @@ def _axle_force(run_settings: PlaneRunSettings, axle_name: str, findings: list[F
 def _samples_without_gaps(
     run_settings: PlaneRunSettings, signal: MeasuredSignal, all_findings: list[Finding]
 ) -> np.ndarray:
+    """Samples (n,) of a signal with bridged gaps; findings on the gaps are appended to ``all_findings``."""
     values, _, findings = bridged_signals(run_settings.recording, signal)
     all_findings += findings
     return values
