@@ -41,7 +41,7 @@ def damped_tyre_error(engine_name: str, work_folder: Path) -> float:
     """Relative error of the first two outputs' variances with a damped tyre, against quadrature; infinite unless only
     the tyre force is reported as infinite."""
     vehicle, road = (
-        linear_equations(quarter_car(*QUARTER_CAR_NUMBERS, tyre_damping=100.0), engine_name),
+        linear_equations(quarter_car(*QUARTER_CAR_NUMBERS, c_t=100.0), engine_name),
         one_track((0.0,), 0.3),
     )
     covariance = stationary_covariance(vehicle_with_road(vehicle, road, SPEED))
@@ -54,9 +54,7 @@ def damped_tyre_naive_result(work_folder: Path) -> str:
     """Result without the guard, as text: variances by the Lyapunov equation if the white noise that reaches outputs
     directly is ignored."""
     system = vehicle_with_road(
-        linear_equations(quarter_car(*QUARTER_CAR_NUMBERS, tyre_damping=100.0), "reference"),
-        one_track((0.0,), 0.3),
-        SPEED,
+        linear_equations(quarter_car(*QUARTER_CAR_NUMBERS, c_t=100.0), "reference"), one_track((0.0,), 0.3), SPEED
     )
     silent = replace(system, D=tuple(0.0 * D for D in system.D))
     return f"C P C' gives the tyre force a standard deviation of {stationary_covariance(silent).deviation[2]:.0f} N"
@@ -271,7 +269,7 @@ CASES = (
         "",
         1e-10,
         ROUNDED,
-        closed_form_error(corner_wavenumber=0.0),
+        closed_form_error(corner=0.0),
     ),
     HardCase(
         "road that next to walks at random",
@@ -280,7 +278,7 @@ CASES = (
         "",
         1e-6,
         "counts as none: 2e-8 1/s beside 3 1/s",
-        closed_form_error(corner_wavenumber=1e-9),
+        closed_form_error(corner=1e-9),
     ),
     HardCase(
         "car that is free on the road",

@@ -31,7 +31,7 @@ def linear_equations(vehicle: SpatialVehicle, implementation: str, speed: float 
 
 
 def closed_form_error(
-    corner_wavenumber: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **quarter_car_parameters: float
+    corner: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **quarter_car_parameters: float
 ) -> Callable[..., float]:
     """Hard case: a quarter car with some parameters changed. Returns its error function: the relative error of the
     variances of acceleration and travel against the closed form."""
@@ -41,11 +41,9 @@ def closed_form_error(
         worst, vehicle = 0.0, quarter_car(*vars(exact).values())
         for speed in speeds:
             covariance = stationary_covariance(
-                vehicle_with_road(
-                    linear_equations(vehicle, implementation), one_track((0.0,), corner_wavenumber), speed
-                )
+                vehicle_with_road(linear_equations(vehicle, implementation), one_track((0.0,), corner), speed)
             )
-            q, w = ROAD_INTENSITY * speed, corner_wavenumber * speed
+            q, w = ROAD_INTENSITY * speed, corner * speed
             worst = max(
                 worst,
                 largest_relative_error(
@@ -64,7 +62,7 @@ def quarter_car(
     spring_stiffness: float,
     damping: float,
     tyre_stiffness: float,
-    tyre_damping: float = 0.0,
+    c_t: float = 0.0,
 ) -> SpatialVehicle:
     """A quarter car (kg, N/m, N s/m); outputs:
     acceleration of the body, suspension travel, and force of the tyre."""
@@ -72,10 +70,7 @@ def quarter_car(
     bodies = tuple(replace(body, mass=m) for body, m in zip(car.bodies, (sprung_mass, unsprung_mass), strict=True))
     springs = (replace(car.springs[0], stiffness=spring_stiffness, damping=damping),)
     return replace(
-        car,
-        bodies=bodies,
-        springs=springs,
-        tyres=(replace(car.tyres[0], stiffness=tyre_stiffness, damping=tyre_damping),),
+        car, bodies=bodies, springs=springs, tyres=(replace(car.tyres[0], stiffness=tyre_stiffness, damping=c_t),)
     )
 
 
