@@ -9,7 +9,7 @@ from pydantic import Field
 
 from models.core.errors import InputError
 from models.core.strict import Strict, read
-from models.ride.varying_speed import VaryingSpeed
+from models.ride.varying_speed import VaryingSpeedDeviations
 from models.systems import run as run_scene
 from models.systems.ride.of_scene import check_linear, vehicle_of
 from models.systems.ride.readings import quasi_stationary_gaps
@@ -70,7 +70,7 @@ def _options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
-def _summary_of_drive(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> dict[str, Any]:
+def _summary_of_drive(drive: VaryingSpeedDeviations, quasi_stationary: np.ndarray) -> dict[str, Any]:
     gaps = quasi_stationary_gaps(drive, quasi_stationary)
     finite = np.isfinite(drive.deviation).all(axis=0)
     worst = [float(gaps[np.abs(gaps[:, i]).argmax(), i]) if finite[i] else None for i in range(len(finite))]
@@ -80,7 +80,7 @@ def _summary_of_drive(drive: VaryingSpeed, quasi_stationary: np.ndarray) -> dict
     }
 
 
-def _table_lines(drive: VaryingSpeed, quasi_stationary: np.ndarray, units: list[str]) -> list[str]:
+def _table_lines(drive: VaryingSpeedDeviations, quasi_stationary: np.ndarray, units: list[str]) -> list[str]:
     """Lines for the screen: each output's largest standard deviation along the drive, and the largest error of the
     quasi-stationary solution, which takes each speed as constant."""
     heads = [f"{name} [{unit}]" for name, unit in zip(drive.names, units, strict=True)]

@@ -14,7 +14,7 @@ from models.core.strict import read
 from models.engines.spatial_protocol import INTEGRATORS
 from models.ride.frequency import standard_errors
 from models.ride.road_path import check_rates
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.systems import run as run_scene
 from models.systems.ride.nonlinear import Nonlinear, Ride, Sampling
 from models.systems.ride.of_scene import excitation_of, has_no_linear_equivalent, vehicle_of
@@ -178,7 +178,7 @@ def _lift_off_shares(vehicle: SpatialVehicle, nonlinear: Nonlinear, runs: dict[s
     return lines
 
 
-def _time_table(runs: dict[str, Ride], nonlinear: Nonlinear, road: Excitation, speed: float) -> list[str]:
+def _time_table(runs: dict[str, Ride], nonlinear: Nonlinear, road: RoadExcitation, speed: float) -> list[str]:
     """Lines for the screen: the engines' standard deviations beside statistical linearisation, and the difference
     between the engines."""
     if not runs:

@@ -14,7 +14,7 @@ from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
 from models.brake.trailer import CHOSEN_TRAILER, plane_of_trailer, plane_of_train
 from models.engines.braking import set_held
 from models.tyre.magic_formula import table_of_surface
-from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
+from models.tyre.tyre_table import StackedTyreTables, TyreTable, stacked_tables
 from validation.braking.braked_truck import RollingTruck, constant_friction, on_road, truck_on_tables
 
 MU = 0.4
@@ -123,7 +123,7 @@ def test_a_wheel_at_a_frozen_speed_keeps_its_momentum():
     assert 0.0 < end.impulse < 1.2 * 4e3 * 2e-3 and not math.isclose(end.turning, start.turning)
 
 
-def falling() -> Tables:
+def falling() -> StackedTyreTables:
     """Friction that is greatest at a slip of 0.1, and half as great where a wheel is locked."""
     along = np.broadcast_to(np.array([0.0, 2.0 * MU, MU]), (3, 1, 3)).copy()
     nodes = np.array([0.0, 0.1, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])

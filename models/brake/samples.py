@@ -73,7 +73,7 @@ class BrakeCommands(NamedTuple):
     (W,) in bar, of which the first is NaN where valve states apply instead, and steer angles (W,) in rad.
     """
 
-    sample_generator: np.ndarray
+    samples: np.ndarray
     valves: np.ndarray
     pressures: np.ndarray
     steer: np.ndarray

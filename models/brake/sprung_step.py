@@ -259,7 +259,7 @@ class SprungStepData(NamedTuple):
     numbers: np.ndarray
     known: WheelData
     contacts: WheelContacts
-    add_vehicle_forces: np.ndarray
+    forces: np.ndarray
     middle: np.ndarray
     rates: np.ndarray
     liveliness: float

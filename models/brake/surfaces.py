@@ -10,7 +10,7 @@ from models.brake.plane_chain import ChainPoint, chain_point_position, chain_poi
 from models.brake.plane_vehicle import PlaneVehicle
 from models.core.errors import InputError
 from models.machine.compiled import inlined, lean
-from models.tyre.tyre_table import Tables
+from models.tyre.tyre_table import StackedTyreTables
 
 
 class RoadSurfaces(NamedTuple):
@@ -37,8 +37,8 @@ class VehicleOnRoad(NamedTuple):
     plane: PlaneVehicle
     kind: np.ndarray
     slope: float
-    tables: Tables
-    road_of_stretches: RoadSurfaces
+    tables: StackedTyreTables
+    road: RoadSurfaces
 
 
 class WheelSurfaces(NamedTuple):

@@ -122,8 +122,8 @@ def friction_warning(force_ratios: np.ndarray) -> str:
     if not beyond.size:
         return ""
     return (
-        f"the linear theory's force is more than friction can carry at {beyond.size} of {force_ratios.size} creepages, up "
-        f"to {beyond.max():.3g} mu N: it knows no slip"
+        f"the linear theory's force is more than friction can carry at {beyond.size} of {force_ratios.size} creepages, "
+        f"up to {beyond.max():.3g} mu N: it knows no slip"
     )
 
 

@@ -36,7 +36,7 @@ ROLL_ITERATIONS = 3
 """Count of iterations for the roll angle with the approaches of both wheels."""
 SPIN_ITERATIONS = 2
 """Count of iterations for the speed of spin with the exact loads of the patches."""
-ITERATIONS = 60
+ITERATION_COUNT = 60
 SPIN_SEARCH_SHARE = 0.05
 """Share of the nominal speed of spin within which the speed without moment about the axle is searched."""
 CELLS_PER_STRIP = 31
@@ -115,7 +115,7 @@ class WheelsetPlacement:
 
     shift: float
     yaw: float
-    solve_rolling_contact: float
+    roll: float
     spin_speed: float
     right: tuple[PatchReport, ...]
     left: tuple[PatchReport, ...]
@@ -249,7 +249,7 @@ class WheelsetContact:
     ) -> LoadedWheel:
         """The wheel in vertical equilibrium: normal and creep forces together carry the load. ``wheel_by_normal``
         returns the wheel for a vertical part (N) of the normal forces, which is iterated from ``normal_force``."""
-        for _ in range(ITERATIONS):
+        for _ in range(ITERATION_COUNT):
             wheel = self._with_creep_forces(wheel_by_normal(normal_force))
             if abs(normal_force - wheel.creep_lift - self.load) < LOAD_PRECISION * self.load:
                 return wheel
@@ -301,7 +301,7 @@ class WheelsetContact:
             return 0.0, 0.0, 0.0
         axle, arm = wheelset_pose.rotation[:, 1], self._arm(wheelset_pose, touching_place)
         velocity = spin_speed * np.cross(axle, arm) + np.array([self.speed, 0.0, 0.0])
-        across, into = _surface_axes(touching_place)
+        across, into = _rail_surface_axes(touching_place)
         slips = velocity[0] / self.speed, velocity @ across / self.speed, spin_speed * axle @ into / self.speed
         return float(slips[0]), float(slips[1]), float(slips[2])
 
@@ -346,7 +346,9 @@ class WheelsetContact:
         y, x = (float(np.average(values, weights=loads)) for values in zip(*centres, strict=True))
         fx, fy = (float(sum(force[k] for _, _, force, _ in patch_rows)) for k in (0, 1))
         mz = sum(
-            float(_surface_axes(touch)[1] @ _patch_moment(self._arm(loaded_wheel.pose, patch) - start, patch, force))
+            float(
+                _rail_surface_axes(touch)[1] @ _patch_moment(self._arm(loaded_wheel.pose, patch) - start, patch, force)
+            )
             for patch, _, force, _ in patch_rows
         )
         boxes = np.array([share.box for *_, share in patch_rows])
@@ -398,7 +400,7 @@ def rolling_radius_difference(placement: WheelsetPlacement) -> float:
     return right.rolling_radius - left.rolling_radius
 
 
-def _surface_axes(touching_place: TouchingPlace) -> tuple[Array, Array]:
+def _rail_surface_axes(touching_place: TouchingPlace) -> tuple[Array, Array]:
     """Unit vectors along the rail's surface and along its inward normal, in the track's axes."""
     cosine, sine = math.cos(touching_place.angle), math.sin(touching_place.angle)
     return np.array([0.0, cosine, sine]), np.array([0.0, -sine, cosine])
@@ -407,5 +409,5 @@ def _surface_axes(touching_place: TouchingPlace) -> tuple[Array, Array]:
 def _patch_moment(lever: Array, touching_place: TouchingPlace, creep_force: ForceOrCreepage) -> Array:
     """Moment (3,) of a patch's creep forces and spin moment about a point; ``lever`` is the vector (m) from that point
     to the patch."""
-    across, into = _surface_axes(touching_place)
+    across, into = _rail_surface_axes(touching_place)
     return np.cross(lever, creep_force[0] * np.array([1.0, 0.0, 0.0]) + creep_force[1] * across) + creep_force[2] * into

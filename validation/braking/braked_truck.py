@@ -10,11 +10,11 @@ from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, PlaneVehicle, plane
 from models.brake.surfaces import UNIFORM_ROAD, RoadSurfaces, VehicleOnRoad
 from models.core.errors import RunFailed
 from models.tyre.magic_formula import table_of_surface
-from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
+from models.tyre.tyre_table import StackedTyreTables, TyreTable, stacked_tables
 
 
 def on_road(
-    plane: PlaneVehicle, tables: Tables, road: RoadSurfaces = UNIFORM_ROAD, slope: float = 10.0
+    plane: PlaneVehicle, tables: StackedTyreTables, road: RoadSurfaces = UNIFORM_ROAD, slope: float = 10.0
 ) -> VehicleOnRoad:
     """A plane vehicle on a road, all of its wheels with the same tyre. slope: cornering slope of its friction
     (1/rad)."""
@@ -93,12 +93,12 @@ LOCKING_TORQUE = 1e9
 """Torque (N m) that locks a wheel at once."""
 
 
-def truck_on_tables(tables: Tables | None = None, plane: PlaneVehicle = PAPER_PLANE) -> VehicleOnRoad:
+def truck_on_tables(tables: StackedTyreTables | None = None, plane: PlaneVehicle = PAPER_PLANE) -> VehicleOnRoad:
     """The paper's truck on ice, or on other tyre tables with the cornering slope of ice."""
     return on_road(plane, tables or stacked_tables([ICE_TABLE]), slope=ICE_TABLE.cornering)
 
 
-def constant_friction(mu: float) -> Tables:
+def constant_friction(mu: float) -> StackedTyreTables:
     """Tyre tables whose friction coefficient is ``mu`` at every slip above 0.1."""
     flat = np.broadcast_to(np.array([0.0, mu, mu]), (3, 1, 3)).copy()
     nodes = np.array([0.0, 0.1, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])

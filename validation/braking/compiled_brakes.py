@@ -20,8 +20,8 @@ from models.engines.braking_sprung import driven_vehicle
 from models.engines.free_vehicle import FreeModel, free_model
 from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import (
+    StackedTyreTables,
     TableCell,
-    Tables,
     cell_and_share,
     lateral_adhesion,
     longitudinal_adhesion,
@@ -32,7 +32,9 @@ PAPER_PLANE: PlaneVehicle = plane_of_truck(PAPER_TRUCK)
 DRY_TABLES = stacked_tables([table_of_surface("dry")])
 
 
-def tyre(tables: Tables, surface: WheelSurface, motion: WheelMotion, load: float, braked: BrakedStep) -> np.ndarray:
+def tyre(
+    tables: StackedTyreTables, surface: WheelSurface, motion: WheelMotion, load: float, braked: BrakedStep
+) -> np.ndarray:
     """Report (7,) of a tyre after a step, by compiled code: the same values as by
     ``models.brake.plain.tyre.tyre_report``.
     """
@@ -62,7 +64,9 @@ def tyre(tables: Tables, surface: WheelSurface, motion: WheelMotion, load: float
     return report[:, 0]
 
 
-def friction(tables: Tables, table_index: int, angle: float, load: float, slip: float) -> tuple[float, float]:
+def friction(
+    tables: StackedTyreTables, table_index: int, angle: float, load: float, slip: float
+) -> tuple[float, float]:
     """Friction coefficients mu_x and mu_y, by compiled code, of a tyre table at a slip angle (rad), a load (N) and a
     slip."""
     cells, (s, w) = (

@@ -9,8 +9,8 @@ import numpy as np
 from models.bicycle.ideal_rolling import IdealBicycle
 from models.bicycle.rolling_tyres import BicycleTyre, RollingBicycle
 from models.bicycle.suspects import forecast_deviations, predicted_weave, ranked_suspects
-from models.bicycle.weave import Observation, observations
-from models.bicycle.whipple import Control, Whipple, load_bicycle
+from models.bicycle.weave import WeaveObservation, read_observations
+from models.bicycle.whipple import SteeringControl, Whipple, load_bicycle
 from models.core.errors import RunFailed
 from models.identification.subsets import SubsetChoice
 from models.systems.bicycle.run import engine_eigenvalues, run
@@ -25,7 +25,7 @@ TYRE_STIFFNESS_FACTORS = (4.0, 16.0, 64.0, 256.0)
 """Factors by which the tyres are stiffer than usual."""
 SPEED = 5.0
 """Speed (m/s) at which eigenvalues of the bicycle on tyres are compared."""
-MEASURED_FEEDBACK = Control(gain=2.0)
+MEASURED_FEEDBACK = SteeringControl(gain=2.0)
 """Feedback control of the measured bicycle."""
 LOWEST_JUDGED_SPEED = 2.0
 """Lowest speed (m/s) at which the predicted weave damping, with nothing fitted, must meet the measured one."""
@@ -183,7 +183,7 @@ def _measured_rows(quick: bool) -> tuple[list[Row], list[list[str]]]:
     if folder is None or not (folder / "windows.csv").is_file():
         why = "TWINRIG_DATA names no folder with bicycle/windows.csv"
         return [not_run("bicycle.measured", SYSTEM, "weave of a measured bicycle", why)], []
-    bicycle, seen = load_bicycle("steer_by_wire"), observations(folder)
+    bicycle, seen = load_bicycle("steer_by_wire"), read_observations(folder)
     rows, table = [], []
     for observation in seen:
         rows += _unfitted_rows(bicycle, observation)
@@ -197,7 +197,7 @@ def _measured_rows(quick: bool) -> tuple[list[Row], list[list[str]]]:
     return [*rows, *_choice_rows(ranked_suspects(bicycle, MEASURED_FEEDBACK, seen))], table
 
 
-def _unfitted_rows(bicycle: Whipple, observation: Observation) -> list[Row]:
+def _unfitted_rows(bicycle: Whipple, observation: WeaveObservation) -> list[Row]:
     model, mean, deviation = (
         predicted_weave(bicycle, MEASURED_FEEDBACK, observation),
         observation.mean,
@@ -227,7 +227,7 @@ def _unfitted_rows(bicycle: Whipple, observation: Observation) -> list[Row]:
     return [judged, frequency.beside(0.0, f"{why}; judged after the choice of suspects", "measured")]
 
 
-def _predicted_rows(bicycle: Whipple, choice: SubsetChoice, observation: Observation) -> list[Row]:
+def _predicted_rows(bicycle: Whipple, choice: SubsetChoice, observation: WeaveObservation) -> list[Row]:
     gaps = forecast_deviations(bicycle, MEASURED_FEEDBACK, choice, observation)
     why = (
         "scatter of the windows and error of the forecast; suspects chosen and fitted on the other speeds, by weights "
@@ -269,7 +269,7 @@ def _choice_rows(choice: SubsetChoice) -> list[Row]:
     ]
 
 
-def _table_line(bicycle: Whipple, choice: SubsetChoice | None, observation: Observation) -> list[str]:
+def _table_line(bicycle: Whipple, choice: SubsetChoice | None, observation: WeaveObservation) -> list[str]:
     model, mean, deviation = (
         predicted_weave(bicycle, MEASURED_FEEDBACK, observation),
         observation.mean,

@@ -19,7 +19,7 @@ import numpy as np
 import models.brake.port as port
 from models.brake.controller import SAMPLING_PERIOD, Controller, Sample
 from models.brake.port.ask import ControllerFailed, checked_command
-from models.brake.port.example import ExampleController
+from models.brake.port.example import Example
 from models.brake.port.setup import ControllerRunData, PortTable, controller_of_run
 from models.machine.timing import median
 from models.systems.braking.march import BrakingPath
@@ -31,7 +31,7 @@ from validation.common.rows import Observed, Row, System, Table, behaviour_row, 
 
 TITLE = "The controller port: same bits on every way, and controllers that fail"
 SYSTEM: System = "anti-lock"
-EXAMPLE = "models.brake.port.example:ExampleController"
+EXAMPLE = "models.brake.port.example:Example"
 TIMEOUT = 0.5
 """Time-out (s) for one command of a controller that falls silent. A run whose controller fails shall have ended within
 twice that time."""
@@ -193,8 +193,7 @@ def _exchange_times(
             if isinstance(table, dict)
         }
         controllers = {
-            name: stack.enter_context(controller_of_run(table, facts, ExampleController(4)))[0]
-            for name, table in tables.items()
+            name: stack.enter_context(controller_of_run(table, facts, Example(4)))[0] for name, table in tables.items()
         }
         for i in range(round_count):
             for name, controller in controllers.items():

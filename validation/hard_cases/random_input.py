@@ -16,7 +16,7 @@ from models.engines.protocol import build
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
 from models.ride.road_path import RoadPath, road_path
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.road.two_track import road_excitation, road_of_level, wheels_on_track
 from models.sensors.inertial_unit import (
     angle_random_walk_of,
@@ -92,8 +92,8 @@ def stream_piece_error(implementation: str, folder: Path) -> float:
     return float(np.abs(np.concatenate(parts[::-1]) - complete_stream).max())
 
 
-def _one_state() -> Excitation:
-    return Excitation(np.array([[-CORNER]]), np.array([[Q**0.5]]), (np.ones((1, 1)),), (0.0,))
+def _one_state() -> RoadExcitation:
+    return RoadExcitation(np.array([[-CORNER]]), np.array([[Q**0.5]]), (np.ones((1, 1)),), (0.0,))
 
 
 def road_variance_error(implementation: str, folder: Path) -> float:

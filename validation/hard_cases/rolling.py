@@ -14,7 +14,7 @@ from models.core.errors import InputError, RunFailed
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
 from models.rail.eigenvalues import free_wheelset
-from models.rail.equations import Equations
+from models.rail.equations import WheelsetEquations
 from models.rail.equations import WheelsetPath as Motion
 from models.rail.wheelset import CHOSEN_WHEELSET, GRAVITY, Wheelset
 from models.systems.wheelset.of_scene import implementation as kind_of
@@ -32,12 +32,12 @@ MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
 
 def built_wheelset(
     implementation: str, wheelset: Wheelset = CHOSEN_WHEELSET, speed: float = 40.0, **options: Any
-) -> Equations:
+) -> WheelsetEquations:
     """Equations of motion of a wheelset in an implementation, with few contact cells."""
     return KINDS[implementation](wheelset, speed, **({"cells": 7} | options))
 
 
-def displaced_state(equations: Equations, **values: float) -> np.ndarray:
+def displaced_state(equations: WheelsetEquations, **values: float) -> np.ndarray:
     """Rest state with values added to entries named as in ``models.rail.equations``, such as Y."""
     state = equations.rest.copy()
     for name, value in values.items():
@@ -245,7 +245,7 @@ def too_large_naive(folder: Path) -> str:
     for step in (STEP, STEP / 8.0):
         states, contacts = np.empty((1, eq.STATE_COUNT)), equations.empty_contacts(1)
         state = displaced_state(equations, **LANDING)
-        eq.march(state, equations.parameters, (step, round(0.1 / step), 1_000_000), states, contacts)
+        eq.march_wheelset(state, equations.parameters, (step, round(0.1 / step), 1_000_000), states, contacts)
         ends.append(state)
     return f"displaced by {1e3 * abs(ends[1][eq.Y] - ends[0][eq.Y]):.2g} mm more or less after 0.1 s"
 

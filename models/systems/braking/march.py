@@ -28,7 +28,7 @@ from models.brake.samples import (
 )
 from models.brake.surfaces import UNIFORM_ROAD, RoadSurfaces, VehicleOnRoad, check_step_distance
 from models.core.errors import RunFailed
-from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
+from models.tyre.tyre_table import StackedTyreTables, TyreTable, stacked_tables
 
 MOST_SAMPLES_AT_ONCE = 1024
 """Most samples that are computed at a time where the controller's command is constant."""
@@ -77,7 +77,7 @@ class BrakedVehicle:
 
     plane: PlaneVehicle
     kind: np.ndarray
-    tables: Tables
+    tables: StackedTyreTables
     slope: float
     road: RoadSurfaces
     brakes: WheelBrakes

@@ -15,9 +15,9 @@ from models.core.errors import InputError
 from models.core.result import Result
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
-from models.ride.sweep import Sweep
+from models.ride.sweep import VarianceSweep
 from models.ride.weighting import system_with_weightings
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.systems.ride.of_scene import LinearVehicleAtSpeed
 from models.vehicles.linear_vehicle import LinearVehicle
 
@@ -59,9 +59,9 @@ def _symmetrised(matrix: np.ndarray) -> np.ndarray:
 
 def with_error_of_sweep(
     run: Result,
-    sweep: Sweep,
+    sweep: VarianceSweep,
     linear: LinearVehicleAtSpeed,
-    roads: Mapping[str, Excitation],
+    roads: Mapping[str, RoadExcitation],
     weightings: Mapping[str, str],
     matrix_accuracy: float,
 ) -> Result:
@@ -97,7 +97,11 @@ def with_error_of_sweep(
 
 
 def _deviations_of_changed(
-    linear: LinearVehicleAtSpeed, road: Excitation, weightings: Mapping[str, str], speed: float, matrix_accuracy: float
+    linear: LinearVehicleAtSpeed,
+    road: RoadExcitation,
+    weightings: Mapping[str, str],
+    speed: float,
+    matrix_accuracy: float,
 ) -> np.ndarray:
     """Standard deviations (outputs,) at a speed (m/s) of the vehicle with changed last digits; NaN where the solution
     fails.

@@ -12,7 +12,7 @@ from models.core.errors import InputError
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict, quantity
 from models.rail.contact_table import CELLS_PER_STRIP, WheelsetContact
-from models.rail.laid_profiles import Profiles
+from models.rail.laid_profiles import CrossSections
 from models.systems.contact.scene import Bodies
 
 MOST_CELLS = 300
@@ -62,7 +62,7 @@ class WheelRailScene(SceneFile):
     system: Literal["wheel-rail"] = "wheel-rail"
     study: str = Field(default="manchester", description="the study that runs the scene")
     bodies: Bodies = Bodies()
-    profiles: Profiles = Profiles()
+    profiles: CrossSections = CrossSections()
     wheelset: WheelsetOnRails = WheelsetOnRails()
     positions: Positions = Positions()
     method: Method = Method()

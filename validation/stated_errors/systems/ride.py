@@ -17,7 +17,7 @@ from models.ride.excited import vehicle_with_road
 from models.ride.nonlinear_copies import copies_in_time
 from models.ride.road_path import RoadPath
 from models.ride.varying_speed import LARGEST_RATE_TIMES_STEP, varying_speed
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.systems.ride.nonlinear import RUNGE_KUTTA_ORDER, Sampling, engine_result, linearised_result, ride_over
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
 from models.systems.ride.run import ANY_SPEED, run
@@ -88,7 +88,7 @@ def _sample_of_sweep(generator: np.random.Generator, sample_number: int) -> Samp
     )
 
 
-def exact_deviations(linear_vehicle: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
+def exact_deviations(linear_vehicle: LinearVehicle, road: RoadExcitation, speed: float) -> np.ndarray:
     """Standard deviations (p,) of the outputs of a linear vehicle with undamped tyres, computed in extended
     precision."""
     system, n, m = vehicle_with_road(linear_vehicle, road, speed), len(linear_vehicle.mass), len(road.F)
@@ -218,7 +218,7 @@ def _sample_in_time(generator: np.random.Generator, sample_number: int) -> Sampl
 
 
 def _road_path_of_run(
-    scene: RideScene, engine: str, vehicle: SpatialVehicle, sampling: Sampling, road: Excitation, speed: float
+    scene: RideScene, engine: str, vehicle: SpatialVehicle, sampling: Sampling, road: RoadExcitation, speed: float
 ) -> RoadPath:
     """Road path with the step that ``in_engine`` uses."""
     from models.ride.nonlinear_copies import longest_resolving_step

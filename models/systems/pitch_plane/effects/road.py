@@ -122,7 +122,7 @@ def _road_profile(scene: Any, parameters: Parameters, distance: float) -> tuple[
 
 
 def _measured_road(scene: Any, parameters: Parameters, distance: float) -> Any:
-    from models.road.continuation import RUN_IN_LENGTH, continued_road, run_in
+    from models.road.continuation import RUN_IN_LENGTH, continued_road, road_with_run_in
 
     path, track = scene.path(parameters.file, "effects.road.file"), parameters.track or "mean"
     length = RUN_IN_LENGTH if parameters.run_in is None else parameters.run_in
@@ -137,7 +137,7 @@ def _measured_road(scene: Any, parameters: Parameters, distance: float) -> Any:
     _check_length(scene, parameters, raw, distance, length)
     longer = continued_road(raw, str(parameters.beyond_end), distance, path)
     assert isinstance(longer, type(raw))
-    return run_in(longer, length)
+    return road_with_run_in(longer, length)
 
 
 def _check_length(scene: Any, parameters: Parameters, raw: Any, distance: float, run_in: float) -> None:
