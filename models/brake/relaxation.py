@@ -97,7 +97,7 @@ def advance_all_lagging_slips(vehicle_state, duration, steer_angles, vehicle, ty
     for i in range(tyre_lag.angle.size):
         k = plane.unit[i]
         vx, vy = chain_point_velocity(
-            ChainPoint(k, plane.place[i, 0], plane.place[i, 1]), vehicle_state[0], vehicle_state[1], plane.reach
+            ChainPoint(k, plane.place[i, 0], plane.place[i, 1]), vehicle_state[0], vehicle_state[1], plane.arm_lengths
         )
         c, s = math.cos(vehicle_state[0, 2 + k] + steer_angles[i]), math.sin(vehicle_state[0, 2 + k] + steer_angles[i])
         advance_lagging_slip(i, c * vx + s * vy, c * vy - s * vx, duration, vehicle.slope, tyre_lag, slip_tangents)

@@ -134,8 +134,8 @@ def fill_surfaces_under_wheels(vehicle_state, time_step, vehicle_on_road, wheel_
         return
     for i in range(plane.unit.size):
         centre = ChainPoint(plane.unit[i], plane.place[i, 0], plane.place[i, 1])
-        px, py = chain_point_position(centre, vehicle_state[0], plane.reach)
-        vx, vy = chain_point_velocity(centre, vehicle_state[0], vehicle_state[1], plane.reach)
+        px, py = chain_point_position(centre, vehicle_state[0], plane.arm_lengths)
+        vx, vy = chain_point_velocity(centre, vehicle_state[0], vehicle_state[1], plane.arm_lengths)
         low, high = min(px, px + time_step * vx), max(px, px + time_step * vx)
         right, left = min(py, py + time_step * vy), max(py, py + time_step * vy)
         first_stretch = max(np.searchsorted(road.starts, low, side="right") - 1, 0)

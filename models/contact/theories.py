@@ -195,7 +195,7 @@ class SimplifiedTheory(RollingOnPatches):
         """Creep forces, with ``cell_count`` strips and as many cells per strip in each patch; fields are placed along
         the rail's contour.
         """
-        forces = roll_simplified(self.pressed, self.friction, *creepages, cells=cell_count)
+        forces = roll_simplified(self.pressed, self.friction, *creepages, cell_count=cell_count)
         inside = self.along_contour(forces.fields)
         return RollingResult(forces.fx, forces.fy, forces.mz, forces.stick_share, forces.power, inside)
 

@@ -86,7 +86,7 @@ def bodies(plane: PlaneVehicle) -> SpatialVehicle:
     chain = list[Body]()
     for k, (mass, turn) in enumerate(zip(plane.masses, plane.inertias, strict=True)):
         tensor = ((turn, 0.0, 0.0), (0.0, turn, 0.0), (0.0, 0.0, turn))
-        hinge, centre = float(plane.reach[k, :k].sum()), float(plane.reach[k].sum())
+        hinge, centre = float(plane.arm_lengths[k, :k].sum()), float(plane.arm_lengths[k].sum())
         if k == 0:
             chain.append(Body("0", float(mass), (0.0, 0.0, 0.0), ("x", "y", "rz"), tensor))
             continue
@@ -103,7 +103,7 @@ class EngineChassis:
     def __init__(self, engine: str, plane: PlaneVehicle) -> None:
         units, none = plane.masses.size, np.zeros((3, plane.wheels))
         wheels = np.vstack((plane.unit, plane.place.T, none))
-        numbers = np.concatenate(([units, plane.wheels], plane.reach.ravel(), wheels.ravel()))
+        numbers = np.concatenate(([units, plane.wheels], plane.arm_lengths.ravel(), wheels.ravel()))
         driven = Driven(bodies(plane), np.zeros(3), numbers, held, set_held)
         self._model: FreeModel = free_model(engine, driven)
         self._held = WheelForces(*self._model.numbers[HEADER + units * units :].reshape(HELD, plane.wheels))

@@ -152,7 +152,7 @@ def _responses_before_arrival(
     axle has met it before."""
     if matrix_exponential is None:
 
-        def propagator(time: float, B: np.ndarray) -> np.ndarray:
+        def matrix_exponential(time: float, B: np.ndarray) -> np.ndarray:
             return np.asarray(expm(A * time) @ B)
 
     responses = [np.zeros_like(noise_arrivals_at_axles.B[0])]

@@ -334,9 +334,9 @@ def run(vehicle: Any, speed: float, steer: float, most_samples: int) -> Callable
     truck = Truck(
         plane.place[:, 0].copy(),
         plane.place[:, 1].copy(),
-        plane.static,
+        plane.static_loads,
         plane.radius,
-        plane.spin,
+        plane.spin_inertia,
         plane.masses[0],
         plane.inertias[0],
         vehicle.tables,

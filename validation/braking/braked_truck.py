@@ -113,7 +113,7 @@ def transfer_errors(mu: float = 0.4) -> dict[str, float]:
     axles' loads change by m z g h / E.
     """
     lift = PAPER_TRUCK.height / PAPER_TRUCK.wheelbase
-    light, static = PAPER_PLANE._replace(spin=np.full(4, 1e-9)), PAPER_PLANE.static.reshape(2, 2).sum(1)
+    light, static = PAPER_PLANE._replace(spin_inertia=np.full(4, 1e-9)), PAPER_PLANE.static_loads.reshape(2, 2).sum(1)
     slowing = {
         "all wheels": mu * GRAVITY,
         "front wheels": mu * static[0] / (PAPER_TRUCK.mass * (1.0 - mu * lift)),

@@ -284,12 +284,12 @@ class _ExchangeClock:
     def __enter__(self) -> "_ExchangeClock":
         from models.systems.braking import march
 
-        self.last_start, self._march, self._ask = time.perf_counter(), march, march.ask
-        march.ask = self._timed_ask  # type: ignore[assignment]
+        self.last_start, self._march, self._ask = time.perf_counter(), march, march.checked_command
+        march.checked_command = self._timed_ask  # type: ignore[assignment]
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._march.ask = self._ask
+        self._march.checked_command = self._ask
 
     def _timed_ask(self, controller: Controller, sample: Sample, *arguments: Any) -> Any:
         self.last_start = time.perf_counter()

@@ -122,8 +122,8 @@ class BrakedVehicle:
         steady = self.steering is None and is_steady(controller)
         samples_at_once = int(min(duration / self.sample + 2.0, MOST_SAMPLES_AT_ONCE)) if steady else 1
         record = SampleRecord(
-            current_row.whole,
-            np.empty((samples_at_once, current_row.whole.size)),
+            current_row.all_values,
+            np.empty((samples_at_once, current_row.all_values.size)),
             np.zeros(1, dtype=np.int64),
             duration - 1e-9,
         )
@@ -132,13 +132,13 @@ class BrakedVehicle:
             LARGEST_PRESSURE if isinstance(controller, SensedController) else 0.0
         )  # noise of a sensor may exceed the supply
         motion = current_row.motion(np.zeros(2 + self.plane.masses.size))
-        rows, status = [current_row.whole[None].copy()], FINE
+        rows, status = [current_row.all_values[None].copy()], FINE
         try:
             for number, (status, time, speed, supply) in enumerate(self._moving(commands, record, current_row, motion)):
                 if status in FATAL_END_STATUSES:
                     raise RunFailed("braking", ending_sentence(status, self.plane, motion), time)
                 _move_rows(rows, record)
-                if status == AT_REST or time >= record.until:
+                if status == AT_REST or time >= record.end_time:
                     break
                 braked = time >= self.switch_time - 1e-9
                 commands.samples[0] = samples_at_once if braked else 1
@@ -219,8 +219,8 @@ def _write_command(commands: BrakeCommands, command: Command, braked: bool) -> N
 
 def _move_rows(rows: list[np.ndarray], record: SampleRecord) -> None:
     """Append a copy of the recorded rows to ``rows``, and empty the record."""
-    rows.append(record.rows[: record.left[0]].copy())
-    record.left[0] = 0
+    rows.append(record.rows[: record.uncollected_count[0]].copy())
+    record.uncollected_count[0] = 0
 
 
 def _braking_path(rows: list[np.ndarray], row: RecordedRow, stands: bool, names: tuple[str, ...]) -> BrakingPath:

@@ -223,7 +223,7 @@ def steady_turn(vehicle: BrakedVehicle, speed: float, radius: float) -> SteadyTu
     suspension.
     """
     plane, units = vehicle.plane, vehicle.plane.masses.size
-    rearmost_x = np.array([plane.reach[k].sum() + plane.place[plane.unit == k, 0].min() for k in range(units)])
+    rearmost_x = np.array([plane.arm_lengths[k].sum() + plane.place[plane.unit == k, 0].min() for k in range(units)])
     unknown = np.zeros(1 + units)  # of wheels that roll along the circle: the last ones of each unit on its tangent
     unknown[0], unknown[1] = np.ptp(plane.place[plane.unit == 0, 0]) / radius, -rearmost_x[0] / radius
     unknown[2:] = (rearmost_x[1:] - rearmost_x[0]) / radius
@@ -248,7 +248,7 @@ def _rolling_speeds(plane: PlaneVehicle, state: np.ndarray, steer: np.ndarray) -
     headings, rates, unit = state[0, 2:], state[1, 2:], plane.unit
     forward = np.column_stack((np.cos(headings), np.sin(headings)))
     leftward = np.column_stack((-forward[:, 1], forward[:, 0]))
-    centres = state[1, :2] + plane.reach @ (rates[:, None] * leftward)
+    centres = state[1, :2] + plane.arm_lengths @ (rates[:, None] * leftward)
     spun = rates[unit, None] * (plane.place[:, :1] * leftward[unit] - plane.place[:, 1:] * forward[unit])
     course = headings[unit] + steer
     rolling_direction = np.column_stack((np.cos(course), np.sin(course)))
