@@ -109,7 +109,7 @@ def fill_state_quantities(vehicle_motion, steer_angles, regularising_speed, at_s
 
 @inlined
 def set_slip_angle(wheel_index, speed_along, speed_across, regularising_speed, lagging_slips, table_angles, wheels):
-    """Set the slip angle of wheel i from the speeds (m/s) of its centre along it, u, and of its tyre across it, v.
+    """Set the slip angle of wheel i from the speeds (m/s) of its centre along it and of its tyre across it.
     Where ``lagging_slips`` (W,) of ``Surfaces`` is a number, it gives the slip angle in place of v.
     """
     i = wheel_index

@@ -42,7 +42,7 @@ class TyreLag(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def lagging_slip(slip_tangent, speed_along, speed_across, duration, relaxation_length):
-    """Tangent of the lagging slip angle after a time (s) at constant speeds u along and v across the wheel (m/s), with
+    """Tangent of the lagging slip angle after a time (s) at constant speeds along and across the wheel (m/s), with
     a relaxation length (m).
     """
     return (
@@ -58,7 +58,7 @@ def lagging_slip(slip_tangent, speed_along, speed_across, duration, relaxation_l
 def advance_lagging_slip(
     wheel_index, speed_along, speed_across, duration, cornering_coefficient, tyre_lag, slip_tangents
 ):
-    """Advance the lagging slip angle of wheel i by a time (s) at speeds u along and v across it (m/s). Its tangent with
+    """Advance the lagging slip angle of wheel i by a time (s) at speeds along and across it (m/s). Its tangent with
     the damper's part goes into ``slip_tangents`` (W,); cornering_coefficient : see ``OnRoad``.
 
     An angle that is NaN starts at its steady value for these speeds.
