@@ -303,8 +303,11 @@ def process(folder, faults, code):
 
 
 def test_machine_code_that_is_kept_takes_the_fault_of_each_process(folder):
-    """``aspects`` calls a compiled function that calls ``aspect``; sound, spoiled, and sound again."""
-    code = "import numpy as np; from models.contact.hertz import aspects; print(aspects(np.array([0.5]))[0][0])"
+    """``axis_ratios_and_integrals`` calls a compiled function; sound, spoiled, and sound again."""
+    code = (
+        "import numpy as np; from models.contact.hertz import axis_ratios_and_integrals as ratios; "
+        "print(ratios(np.array([0.5]))[0][0])"
+    )
     sound, wrong, again = (
         process(folder, {"models.contact.hertz:axis_ratio_and_integrals": fault}, code) for fault in (0.0, 0.01, 0.0)
     )

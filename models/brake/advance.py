@@ -98,7 +98,7 @@ def advance(vehicle_motion, brake_torques, time_step, steer_angles, vehicle):
     """Advance a ``PlaneMotion`` by n steps (s) under torques (n + 1, W) in N m at the steps' ends, which come from
     ``pressure``.
 
-    steer_angles (W,): rad; vehicle: ``OnRoad``. Returns how it ended and the time (s) that passed.
+    steer_angles (W,): rad; vehicle: ``VehicleOnRoad``. Returns how it ended and the time (s) that passed.
     """
     wheels, time = vehicle_motion.turning.size, 0.0
     surfaces = surfaces_of_rows(array(doubles(4 * wheels), (4, wheels)))

@@ -60,7 +60,9 @@ def chain_point_position(chain_point, coordinate_positions, arm_lengths):
 
 @inlined
 def count_of_coordinates(plane_vehicle):
-    """Number of coordinates of a ``Plane``; for a single unit a constant that compiled functions know beforehand."""
+    """Number of coordinates of a ``PlaneVehicle``; for a single unit a constant that compiled functions know
+    beforehand.
+    """
     return 2 + len(plane_vehicle.units)
 
 

@@ -110,7 +110,7 @@ def fill_state_quantities(vehicle_motion, steer_angles, regularising_speed, at_s
 @inlined
 def set_slip_angle(wheel_index, speed_along, speed_across, regularising_speed, lagging_slips, table_angles, wheels):
     """Set the slip angle of wheel i from the speeds (m/s) of its centre along it and of its tyre across it.
-    Where ``lagging_slips`` (W,) of ``Surfaces`` is a number, it gives the slip angle in place of v.
+    Where ``lagging_slips`` (W,) of ``WheelSurfaces`` is a number, it gives the slip angle in place of v.
     """
     i = wheel_index
     forwards = speed_along if wheels.start[i] >= 0.0 else -speed_along
@@ -338,7 +338,7 @@ def time_of_rest(coordinate_rates, wheel_turning, accelerations, time_step, plan
 
 @lean
 def advance_one_step(vehicle_motion, brake_torques, time_step, steer_angles, regularising_speed, vehicle, surfaces):
-    """Advance a ``PlaneMotion`` whose wheels are on ``Surfaces`` by one step (s).
+    """Advance a ``PlaneMotion`` whose wheels are on ``WheelSurfaces`` by one step (s).
 
     brake_torques (2, W) : of the brakes at the step's ends; steer_angles (W,) : angles of the wheels in their units
     (rad);

@@ -59,7 +59,7 @@ def advance_lagging_slip(
     wheel_index, speed_along, speed_across, duration, cornering_coefficient, tyre_lag, slip_tangents
 ):
     """Advance the lagging slip angle of wheel i by a time (s) at speeds along and across it (m/s). Its tangent with
-    the damper's part goes into ``slip_tangents`` (W,); cornering_coefficient : see ``OnRoad``.
+    the damper's part goes into ``slip_tangents`` (W,); cornering_coefficient : see ``VehicleOnRoad``.
 
     An angle that is NaN starts at its steady value for these speeds.
     """

@@ -357,10 +357,9 @@ def march_strips(fine_net, mu, flexibility, creepages, traction):
 
 @compiled
 def traction_after_step(px, py, slip_x, slip_y, traction_bound, middle_bound, is_slipping):
-    """Traction after a step, and whether it slips; without slip the rigid slip would subtract the slip from the
-    traction.
+    """Traction after a step, and whether it slips; a cell that sticks loses the rigid slip from its traction.
 
-    A traction that continues to slip stays on the bound and turns towards minus the slip: with psi between the two,
+    A traction that continues to slip stays on the bound and turns against the slip: with psi between the two,
     tan(psi/2) shrinks by exp(-|slip| / middle_bound), where ``middle_bound`` is the bound in the middle of the step.
     """
     x, y = px - slip_x, py - slip_y

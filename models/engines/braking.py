@@ -117,8 +117,9 @@ class EngineChassis:
         vehicle: VehicleOnRoad,
         *lag: Any,
     ) -> tuple[int, float]:
-        """Advance a braked vehicle as ``models.brake.advance.advance`` does (``advance_lagging`` with a ``Lag``); the
-        engine computes the motion in each step (s). Returns the status and the time (s)."""
+        """Advance a braked vehicle as ``models.brake.advance.advance`` does (``advance_lagging`` with a ``TyreLag``);
+        the engine computes the motion in each step (s). Returns the status and the time (s).
+        """
         time, report, go = 0.0, WheelReport(*motion.report), advance
         if lag:
             from models.brake.relaxation import advance_lagging as go

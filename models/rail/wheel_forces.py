@@ -85,7 +85,7 @@ BLENDED_BRISTLES, SECOND_ORDER_MARCH = FLEXIBILITY_KINDS["blended"], MARCH_KINDS
 
 class RailsAndWheels(NamedTuple):
     """Rails under the wheels and their creep law: WHEELS (1,); profiles, without a node for cones; tables of FASTSIM's
-    grid (``Grid``); law : LINEAR or FASTSIM."""
+    grid (``FastsimGrid``); law : LINEAR or FASTSIM."""
 
     wheels: Array
     profile: LaidProfile

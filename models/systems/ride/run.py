@@ -64,7 +64,8 @@ def run(
     progress : called during such a run. error : whether errors are estimated, by further solutions or runs. Assumptions
     are always checked.
 
-    The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``Nonlinear`` or, for an engine in time, a ``Ride``.
+    The result's detail is a ``VarianceSweep``, a ``VaryingSpeedDeviations``, a ``Nonlinear`` or, for an engine in time,
+    a ``Ride``.
     """
     engine = engine or "reference"
     with scene_errors(scene):
