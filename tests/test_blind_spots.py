@@ -212,7 +212,7 @@ def test_whole_numbers_of_a_table_that_python_makes_stay_for_they_may_be_places(
     ("module", "name", "argument"),
     [
         ("models.tyre.bristles", "tyre_forces", "forces_out"),
-        ("models.contact.fastsim_many", "forces_within", "answers"),
+        ("models.contact.fastsim_many", "fill_contact_forces_in_place", "forces_out"),
     ],
 )
 def test_an_argument_that_only_called_functions_fill_is_spoiled_at_the_end(module, name, argument):
