@@ -22,12 +22,12 @@ from models.bicycle.suspects import (
     predicted_weave,
     ranked_suspects,
 )
-from models.bicycle.weave import Observation, observations
-from models.bicycle.whipple import Control, Whipple, load_bicycle
+from models.bicycle.weave import WeaveObservation, read_observations
+from models.bicycle.whipple import SteeringControl, Whipple, load_bicycle
 from models.core.errors import InputError
 from models.identification.subsets import SubsetChoice
 
-EXPERIMENT_FEEDBACK = Control(gain=2.0, until=6.5)
+EXPERIMENT_FEEDBACK = SteeringControl(gain=2.0, until=6.5)
 """Steer feedback of the experimenters during the recorded runs."""
 
 
@@ -37,7 +37,7 @@ class BicycleObservations:
     mean (2,) and its differences from the measurement in standard deviations (2,). It is made for each speed that was
     not used in the choice; if all were used, each speed is predicted by a choice on all others."""
 
-    observations: list[Observation]
+    observations: list[WeaveObservation]
     parameter_choice: SubsetChoice
     predictions: dict[float, tuple[np.ndarray, np.ndarray]]
 
@@ -46,11 +46,11 @@ def observed_and_predicted(
     data_folder: str | Path,
     chosen_speeds: Sequence[float] = (),
     bicycle: Whipple | None = None,
-    base_control: Control = EXPERIMENT_FEEDBACK,
+    base_control: SteeringControl = EXPERIMENT_FEEDBACK,
 ) -> BicycleObservations:
     """Choose suspected parameters from the measurements at the speeds ``chosen_speeds`` (m/s, all by default), and
     predict weave at the other speeds; raises InputError."""
-    all_observations, bicycle = observations(data_folder), bicycle or load_bicycle("steer_by_wire")
+    all_observations, bicycle = read_observations(data_folder), bicycle or load_bicycle("steer_by_wire")
     speeds = [observation.speed for observation in all_observations]
     for speed in chosen_speeds:
         if speed not in speeds:
@@ -77,7 +77,7 @@ def observed_and_predicted(
 
 
 def observation_lines(
-    bicycle_observations: BicycleObservations, bicycle: Whipple, base_control: Control = EXPERIMENT_FEEDBACK
+    bicycle_observations: BicycleObservations, bicycle: Whipple, base_control: SteeringControl = EXPERIMENT_FEEDBACK
 ) -> list[str]:
     """Lines for the screen on the measured and predicted weave, and on the chosen suspected parameters."""
     lines = ["speed    windows  damping [1/s]             nothing fitted    frequency [rad/s]         nothing fitted"]

@@ -171,7 +171,7 @@ def unit_outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
         plane = plane_of(scene)
         for k in range(1, plane.masses.size):
             axles = plane.place[plane.unit == k, 0]
-            line = np.array([[-plane.reach[k, k], 0.0], [float(axles.max()) + OUTLINE_OVERHANG, 0.0]])
+            line = np.array([[-plane.arm_lengths[k, k], 0.0], [float(axles.max()) + OUTLINE_OVERHANG, 0.0]])
             boxes += [(k, line), (k, _box_outline(float(axles.max()), float(axles.min())))]
     return boxes
 
@@ -182,7 +182,7 @@ def positions_on_road(
     """Positions (m, 2) on the road, in m, of points (m, 2) fixed to a unit of a train. positions (2 + U,) : x, y (m) of
     the vehicle and the yaw angles (rad) of its U units."""
     return np.array(
-        [chain_point_position(ChainPoint(unit_number, x, y), positions, plane_vehicle.reach) for x, y in corners]
+        [chain_point_position(ChainPoint(unit_number, x, y), positions, plane_vehicle.arm_lengths) for x, y in corners]
     )
 
 
@@ -204,7 +204,7 @@ def draw_path_from_above(axis: Axes, scene: BrakingScene, procedure_name: str, s
     x, y = stop.path.states[:, 0, :2].T
     low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0
     plane, drawn = plane_of(scene), unit_outlines(scene)
-    behind_it = -float(plane.reach[-1, :-1].sum())
+    behind_it = -float(plane.arm_lengths[-1, :-1].sum())
     first, largest_x = x.min() - 6.0 - behind_it, x.max() + 6.0
     lacking = (
         max(0.2 * (largest_x - first) - (high - low), 0.0) / 2.0

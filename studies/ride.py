@@ -13,7 +13,7 @@ from models.core.strict import Strict, quantity, read
 from models.core.told import derived_result
 from models.core.whole_files import write_whole
 from models.ride.measures import dynamic_load_factor, exceedance_rate, time_share_beyond
-from models.ride.sweep import Sweep
+from models.ride.sweep import VarianceSweep
 from models.systems import run as run_scene
 from models.systems.ride.of_scene import (
     check_linear,
@@ -176,7 +176,7 @@ def _save_system(scene: RideScene, linearised_vehicle: LinearVehicle, speed: flo
     write_exports(system, stationary_covariance(system), output_folder / "system")
 
 
-def _summary_of_deviations(speed_sweep: Sweep) -> dict[str, Any]:
+def _summary_of_deviations(speed_sweep: VarianceSweep) -> dict[str, Any]:
     """Summary: standard deviation (SI) of each output at all speeds on the scene's road; None for values that are not
     finite."""
     return {
@@ -192,7 +192,11 @@ def _summary_of_deviations(speed_sweep: Sweep) -> dict[str, Any]:
 
 
 def _table_lines(
-    scene: RideScene, vehicle: SpatialVehicle, sweeps_by_engine: dict[str, Sweep], speed: float, study_options: Options
+    scene: RideScene,
+    vehicle: SpatialVehicle,
+    sweeps_by_engine: dict[str, VarianceSweep],
+    speed: float,
+    study_options: Options,
 ) -> list[str]:
     """Lines for the screen: each output's standard deviation at a speed (m/s), and its change on roads with simpler
     correlation."""

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from models.core.errors import InputError
 from models.core.strict import Strict, read
-from models.ride.varying_speed import VaryingSpeed
+from models.ride.varying_speed import VaryingSpeedDeviations
 from models.systems import run as run_scene
 from models.systems.ride.of_scene import check_linear, vehicle_of
 from models.systems.ride.readings import quasi_stationary_errors
@@ -74,7 +74,7 @@ def _study_options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
-def _summary_of_drive(varying_speed: VaryingSpeed, quasi_stationary_deviations: np.ndarray) -> dict[str, Any]:
+def _summary_of_drive(varying_speed: VaryingSpeedDeviations, quasi_stationary_deviations: np.ndarray) -> dict[str, Any]:
     gaps = quasi_stationary_errors(varying_speed, quasi_stationary_deviations)
     finite = np.isfinite(varying_speed.deviation).all(axis=0)
     worst = [float(gaps[np.abs(gaps[:, i]).argmax(), i]) if finite[i] else None for i in range(len(finite))]
@@ -84,7 +84,9 @@ def _summary_of_drive(varying_speed: VaryingSpeed, quasi_stationary_deviations: 
     }
 
 
-def _table_lines(varying_speed: VaryingSpeed, quasi_stationary_deviations: np.ndarray, units: list[str]) -> list[str]:
+def _table_lines(
+    varying_speed: VaryingSpeedDeviations, quasi_stationary_deviations: np.ndarray, units: list[str]
+) -> list[str]:
     """Lines for the screen: each output's largest standard deviation along the drive, and the largest error of the
     quasi-stationary solution, which takes each speed as constant."""
     heads = [f"{name} [{unit}]" for name, unit in zip(varying_speed.names, units, strict=True)]

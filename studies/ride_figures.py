@@ -29,9 +29,9 @@ from models.drawing.figures import (
 from models.drawing.figures import COLOURS as ENGINES
 from models.ride.frequency import one_sided_densities
 from models.ride.statistical_linearisation import ERROR_GRADES
-from models.ride.sweep import Sweep
-from models.ride.varying_speed import VaryingSpeed
-from models.road.excitation import Excitation
+from models.ride.sweep import VarianceSweep
+from models.ride.varying_speed import VaryingSpeedDeviations
+from models.road.excitation import RoadExcitation
 from models.road.fitted import FittedRoad
 from models.road.isotropic import isotropic_road_like
 from models.road.two_track import TwoTrackRoad
@@ -53,8 +53,8 @@ class FigureHeading(NamedTuple):
 
 def body_acceleration_figure(
     point_positions: Sequence[float],
-    sweep_of_points: Sweep,
-    speed_sweep: Sweep,
+    sweep_of_points: VarianceSweep,
+    speed_sweep: VarianceSweep,
     vehicle: SpatialVehicle,
     speed: float,
     heading: FigureHeading,
@@ -103,7 +103,7 @@ NO_FINITE_VARIANCE = "\n(no finite variance)"
 
 
 def outputs_figure(
-    speed_sweep: Sweep,
+    speed_sweep: VarianceSweep,
     kind_and_unit: Sequence[tuple[str, str]],
     static_loads: Mapping[str, float],
     heading: FigureHeading,
@@ -173,7 +173,7 @@ def _distinct_curves(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def spectra_figure(
-    linear_vehicle: LinearVehicle, excitation: Excitation, speed: float, heading: FigureHeading, figure_path: Path
+    linear_vehicle: LinearVehicle, excitation: RoadExcitation, speed: float, heading: FigureHeading, figure_path: Path
 ) -> None:
     """Save a figure of the one-sided spectral densities of accelerations and tyre forces over frequency at a speed
     (m/s); no figure if all are 0."""
@@ -269,7 +269,7 @@ def _signed_text(percent: float) -> str:
 
 
 def drive_figure(
-    varying_speed: VaryingSpeed,
+    varying_speed: VaryingSpeedDeviations,
     steady_deviations: np.ndarray,
     drawn_outputs: Sequence[str],
     kind_and_unit: Mapping[str, tuple[str, str]],
@@ -359,7 +359,7 @@ def nonlinear_figure(nonlinear_sweep: NonlinearRide, heading: FigureHeading, fig
 def engine_spectra_figure(
     runs_by_engine: Mapping[str, EngineRide],
     linear_vehicle: LinearVehicle,
-    road_excitation: Excitation,
+    road_excitation: RoadExcitation,
     speed: float,
     heading: FigureHeading,
     figure_path: Path,

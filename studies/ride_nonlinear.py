@@ -14,7 +14,7 @@ from models.core.strict import read
 from models.engines.spatial_protocol import INTEGRATORS
 from models.ride.frequency import standard_errors
 from models.ride.road_path import check_rates
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.systems import run as run_scene
 from models.systems.ride.nonlinear import EngineRide, NonlinearRide, RunSampling
 from models.systems.ride.of_scene import excitation_of, has_no_linear_equivalent, vehicle_of
@@ -189,7 +189,7 @@ def _lift_off_shares(
 
 
 def _engine_run_lines(
-    runs_by_engine: dict[str, EngineRide], nonlinear_sweep: NonlinearRide, road_excitation: Excitation, speed: float
+    runs_by_engine: dict[str, EngineRide], nonlinear_sweep: NonlinearRide, road_excitation: RoadExcitation, speed: float
 ) -> list[str]:
     """Lines for the screen: the engines' standard deviations beside statistical linearisation, and the difference
     between the engines."""

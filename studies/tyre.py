@@ -16,7 +16,7 @@ from models.core.tables import write_table
 from models.systems.braking.of_scene import tyre_tables_of
 from models.systems.braking.plan import check_reference
 from models.systems.braking.scene import BrakingScene
-from models.tyre.assumptions import assumptions
+from models.tyre.assumptions import tyre_table_assumptions
 from models.tyre.tyre_table import TyreTable
 
 SYSTEM = "braking"
@@ -87,7 +87,7 @@ def save_tyre_friction(scene: BrakingScene, tyre_table: TyreTable, study_options
     channels = {"mu_x": Channel(axes, x, "-", "along the wheel"), "mu_y": Channel(axes, y, "-", "across it")}
     nodes = {"slip_angle": Channel("slip_angle", angles, "deg"), "slip": Channel("slip", tyre_table.slips, "-")}
     read_off = result(scene, channels, nodes, load=study_options.load)
-    with_assumptions(read_off, assumptions(tyre_table, study_options.load))
+    with_assumptions(read_off, tyre_table_assumptions(tyre_table, study_options.load))
     not_estimated(read_off, "a table has no steps: it is read at its nodes, and linear between").save(
         output_path.with_suffix(".nc")
     )

@@ -2,7 +2,7 @@
 
 import pytest
 
-from models.rail.wheel_forces import Workspace, rails_of, workspace_for
+from models.rail.wheel_forces import WheelForcesWorkspace, rails_of, workspace_for
 from models.rail.wheelset import CHOSEN_WHEELSET
 from validation.absence.machinery import allocated_arrays, ratio_of_wheelsets, rows
 
@@ -14,7 +14,7 @@ def test_loops_of_bare_scenes_make_no_arrays():
 def test_an_array_that_is_made_is_counted():
     profile = rails_of(CHOSEN_WHEELSET).profile
     assert allocated_arrays(lambda: [workspace_for(profile) for _ in range(10)]) >= 10 * len(
-        Workspace._fields
+        WheelForcesWorkspace._fields
     )  # each call has six
 
 

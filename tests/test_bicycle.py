@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.bicycle.whipple import Control, Whipple, load_bicycle
+from models.bicycle.whipple import SteeringControl, Whipple, load_bicycle
 from models.core.errors import InputError
 from validation.common.bicycle_published import CAPSIZE_SPEED, PUBLISHED_EIGENVALUES, PUBLISHED_MATRICES, WEAVE_SPEED
 
@@ -69,11 +69,11 @@ def test_wheels_without_inertia_have_eigenvalues():
 def test_the_feedback_steadies_the_measured_bicycle():
     # without it unstable below 4.3 m/s, as its experimenters tell
     assert DELFT.eigenvalues(3.0).real.max() > 0.5
-    assert DELFT.eigenvalues(3.0, Control(gain=2.0)).real.max() < 0.0
+    assert DELFT.eigenvalues(3.0, SteeringControl(gain=2.0)).real.max() < 0.0
 
 
 def test_feedback_ends_at_its_speed_and_reads_the_speed_sensor():
-    control = Control(gain=2.0, speed_gain=1.1, speed_bias=0.1, torque_gain=0.5)
+    control = SteeringControl(gain=2.0, speed_gain=1.1, speed_bias=0.1, torque_gain=0.5)
     assert control.lean_rate_gain(3.0) == pytest.approx(0.5 * 2.0 * (6.5 - 3.4))
     assert control.lean_rate_gain(6.0) == 0.0
 

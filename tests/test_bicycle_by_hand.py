@@ -13,12 +13,14 @@ from scipy.spatial.transform import Rotation
 
 from models.bicycle.four_bodies import COUNT, FRONT, HEIGHT, LEAN, PITCH, REAR, STEER, YAW, X, Y, straight_rolling
 from models.bicycle.rolling_tyres import BicycleTyre, RollingBicycle, set_bicycle_forces
-from models.bicycle.whipple import Control, load_bicycle
+from models.bicycle.whipple import SteeringControl, load_bicycle
 from models.multibody import forces
 
 pytestmark = pytest.mark.grounds("closed form")
 BENCHMARK = load_bicycle("benchmark")
-CONTROL = Control(gain=2.0, until=6.5, friction=0.3, dry_friction=0.2, torque_gain=0.9, speed_gain=0.8, speed_bias=0.25)
+CONTROL = SteeringControl(
+    gain=2.0, until=6.5, friction=0.3, dry_friction=0.2, torque_gain=0.9, speed_gain=0.8, speed_bias=0.25
+)
 """Each number counts, at speeds below 7.8 m/s."""
 STEP = 1e-6
 """Of differences, in m and rad: errors of some 1e-10."""

@@ -5,7 +5,7 @@ import pytest
 
 from models.bicycle.four_bodies import FRONT
 from models.bicycle.rolling_tyres import BicycleTyre, RollingBicycle
-from models.bicycle.whipple import Control, load_bicycle
+from models.bicycle.whipple import SteeringControl, load_bicycle
 from models.core.errors import InputError, RunFailed
 from models.multibody.forces import OF_TYRES, RADIUS
 from models.systems.bicycle.plan import check
@@ -18,8 +18,8 @@ SHORT = {"title": "short", "system": "bicycle", "run": {"duration": 0.2}}
 
 @pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
 def test_stiff_tyres_tend_to_ideal_rolling_with_order_one(engine):
-    stiff = [RollingBicycle(BENCHMARK, BicycleTyre(stiffness=s), Control(friction=0.1)) for s in (16.0, 64.0)]
-    wanted = BENCHMARK.eigenvalues(5.0, Control(friction=0.1))
+    stiff = [RollingBicycle(BENCHMARK, BicycleTyre(stiffness=s), SteeringControl(friction=0.1)) for s in (16.0, 64.0)]
+    wanted = BENCHMARK.eigenvalues(5.0, SteeringControl(friction=0.1))
     gaps = [np.abs(engine_eigenvalues(engine, rolling, 5.0) - wanted).max() for rolling in stiff]
     assert np.log(gaps[0] / gaps[1]) / np.log(4.0) == pytest.approx(1.0, abs=0.02)
     stiff[1].numbers[int(stiff[1].numbers[OF_TYRES]) + RADIUS] *= 1.01  # a planted fault: the rear wheel

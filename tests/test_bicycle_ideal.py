@@ -5,7 +5,7 @@ import pytest
 
 from models.bicycle.four_bodies import LEAN, STEER
 from models.bicycle.ideal_rolling import IdealBicycle
-from models.bicycle.whipple import Control, load_bicycle
+from models.bicycle.whipple import SteeringControl, load_bicycle
 from models.core.errors import RunFailed
 
 BENCHMARK, DELFT = load_bicycle("benchmark"), load_bicycle("steer_by_wire")
@@ -35,7 +35,7 @@ def linearised(model, speed):
 @pytest.mark.parametrize("bicycle", [BENCHMARK, DELFT], ids=["benchmark", "steer_by_wire"])
 def test_its_linearisation_is_the_linear_model(bicycle):
     # differences over 1e-5 of accelerations of up to 1e2 leave 1e-9
-    control = Control(gain=2.0, friction=0.1)
+    control = SteeringControl(gain=2.0, friction=0.1)
     matrix = linearised(IdealBicycle(bicycle, control), 3.0)
     assert np.abs(matrix - bicycle.state_matrix(3.0, control)).max() < 1e-7
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.linalg import expm
 
 from models.bicycle.suspects import forecast_deviations, ranked_suspects
-from models.bicycle.weave import decaying_sinusoid, observations
-from models.bicycle.whipple import Control, load_bicycle
+from models.bicycle.weave import decaying_sinusoid, read_observations
+from models.bicycle.whipple import SteeringControl, load_bicycle
 from models.core.errors import InputError
 from studies.bicycle_measured import EXPERIMENT_FEEDBACK, observation_lines, observed_and_predicted
 
@@ -50,7 +50,7 @@ def test_a_decaying_sinusoid_is_read_exactly():
 
 
 def test_the_suspects_that_made_the_recordings_are_called_for(folder):
-    seen = observations(folder)
+    seen = read_observations(folder)
     choice = ranked_suspects(BICYCLE, EXPERIMENT_FEEDBACK, seen, SUSPECTS)
     assert {*choice.best_subset.names} == {"friction", "speed_gain", "speed_bias"}
     assert choice.undetermined_parameters == ("encoder_gain",)
@@ -61,7 +61,7 @@ def test_the_suspects_that_made_the_recordings_are_called_for(folder):
 
 
 def test_without_a_cause_none_is_called_for(folder):
-    choice = ranked_suspects(BICYCLE, TRUE, observations(folder), ("friction", "torque_gain"))
+    choice = ranked_suspects(BICYCLE, TRUE, read_observations(folder), ("friction", "torque_gain"))
     assert choice.best_subset.names == () and choice.weights[0] > 0.3
 
 
@@ -72,7 +72,7 @@ def test_speeds_that_took_no_part_are_predicted(folder):
 
 
 def test_a_wrong_bicycle_is_noticed(folder):
-    seen, wrong = observations(folder), BICYCLE.changed(trail=1.5 * BICYCLE.trail)
+    seen, wrong = read_observations(folder), BICYCLE.changed(trail=1.5 * BICYCLE.trail)
     choice = ranked_suspects(wrong, TRUE, seen[:3], ())
     assert np.abs(forecast_deviations(wrong, TRUE, choice, seen[3])).max() > 5.0
 
@@ -92,14 +92,14 @@ def test_a_window_that_cannot_be_is_refused(folder, tmp_path, row, said):
         (tmp_path / path.name).write_bytes(path.read_bytes())
     (tmp_path / "windows.csv").write_text(f"file,speed,first,last\n{row}\n")
     with pytest.raises(InputError) as refused:
-        observations(tmp_path)
+        read_observations(tmp_path)
     assert said in str(refused.value) and "windows.csv" in str(refused.value)
 
 
 def test_a_folder_without_windows_and_an_unknown_speed_are_refused(folder, tmp_path):
     with pytest.raises(InputError, match=r"windows\.csv: no such file"):
-        observations(tmp_path)
+        read_observations(tmp_path)
     with pytest.raises(InputError, match="no windows at this speed"):
         observed_and_predicted(folder, (9.0,))
     with pytest.raises(InputError, match="no such suspect"):
-        ranked_suspects(BICYCLE, Control(), observations(folder), ("fricton",))
+        ranked_suspects(BICYCLE, SteeringControl(), read_observations(folder), ("fricton",))

@@ -212,7 +212,7 @@ def test_whole_numbers_of_a_table_that_python_makes_stay_for_they_may_be_places(
     ("module", "name", "argument"),
     [
         ("models.tyre.bristles", "tyre_forces", "forces_out"),
-        ("models.contact.fastsim_many", "forces_within", "answers"),
+        ("models.contact.fastsim_many", "fill_contact_forces_in_place", "forces_out"),
     ],
 )
 def test_an_argument_that_only_called_functions_fill_is_spoiled_at_the_end(module, name, argument):
@@ -303,8 +303,11 @@ def process(folder, faults, code):
 
 
 def test_machine_code_that_is_kept_takes_the_fault_of_each_process(folder):
-    """``aspects`` calls a compiled function that calls ``aspect``; sound, spoiled, and sound again."""
-    code = "import numpy as np; from models.contact.hertz import aspects; print(aspects(np.array([0.5]))[0][0])"
+    """``axis_ratios_and_integrals`` calls a compiled function; sound, spoiled, and sound again."""
+    code = (
+        "import numpy as np; from models.contact.hertz import axis_ratios_and_integrals as ratios; "
+        "print(ratios(np.array([0.5]))[0][0])"
+    )
     sound, wrong, again = (
         process(folder, {"models.contact.hertz:axis_ratio_and_integrals": fault}, code) for fault in (0.0, 0.01, 0.0)
     )
@@ -385,7 +388,7 @@ def test_functions_whose_faults_change_no_value_are_told_apart_and_their_proofs_
 
 
 VIEWS = [name for name, (why, _) in harmless_functions().items() if why == WHY_HARMLESS[1]]
-STATUSES = ("ask", "contact", "simplified")
+STATUSES = ("ask", "solve_contact", "solve_simplified")
 """Functions that return whole numbers: how a contact ended."""
 
 

@@ -14,7 +14,7 @@ from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
 from models.brake.trailer import CHOSEN_TRAILER, plane_of_trailer, plane_of_train
 from models.engines.braking import set_held
 from models.tyre.magic_formula import table_of_surface
-from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
+from models.tyre.tyre_table import StackedTyreTables, TyreTable, stacked_tables
 from validation.braking.braked_truck import RollingTruck, constant_friction, on_road, truck_on_tables
 
 MU = 0.4
@@ -24,7 +24,7 @@ LOCKING = np.full(4, 1e14)
 def places(q, plane):
     """Centres of the units on the ground (U, 2): each unit's reach along all headings before it, and its own."""
     ways = np.column_stack((np.cos(q[2:]), np.sin(q[2:])))
-    return q[:2] + plane.reach @ ways
+    return q[:2] + plane.arm_lengths @ ways
 
 
 def slopes(function, q, step=1e-6):
@@ -73,7 +73,7 @@ def test_wheels_act_on_a_train_by_the_work_of_their_forces():
     steer, held = random.uniform(-0.2, 0.2, wheels), random.normal(0.0, 5e3, (2, wheels))
     q = random.uniform(-0.5, 0.5, 2 + units)
     numbers = np.concatenate(
-        ([units, wheels], plane.reach.ravel(), plane.unit, plane.place.T.ravel(), steer, held.ravel())
+        ([units, wheels], plane.arm_lengths.ravel(), plane.unit, plane.place.T.ravel(), steer, held.ravel())
     )
     block = np.concatenate((np.full(q.size, 9.0), q, np.zeros(q.size), numbers))
     set_held(block.ctypes.data, 0.0, q.size)
@@ -123,7 +123,7 @@ def test_a_wheel_at_a_frozen_speed_keeps_its_momentum():
     assert 0.0 < end.impulse < 1.2 * 4e3 * 2e-3 and not math.isclose(end.turning, start.turning)
 
 
-def falling() -> Tables:
+def falling() -> StackedTyreTables:
     """Friction that is greatest at a slip of 0.1, and half as great where a wheel is locked."""
     along = np.broadcast_to(np.array([0.0, 2.0 * MU, MU]), (3, 1, 3)).copy()
     nodes = np.array([0.0, 0.1, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
@@ -139,15 +139,17 @@ def test_wheels_at_the_edge_of_locking_bear_the_load_that_just_locks_them(inerti
     Loads give the acceleration by load transfer, and this the forces; the front wheels are locked. The jump is closed
     in to ``JUMP_WIDTH`` on both sides.
     """
-    plane = plane_of_truck(PAPER_TRUCK)._replace(spin=np.full(4, inertia))
-    load = (plane.static - plane.by_x * MU * GRAVITY) * (1.0 - share)  # a little less than behind if all are locked
+    plane = plane_of_truck(PAPER_TRUCK)._replace(spin_inertia=np.full(4, inertia))
+    load = (plane.static_loads - plane.load_per_x_acceleration * MU * GRAVITY) * (
+        1.0 - share
+    )  # a little less than behind if all are locked
     torques = np.where(plane.place[:, 0] < 0.0, plane.radius * MU * load, LOCKING)
     moving = RollingTruck(on_road(plane, falling(), cornering_slope=1e-6), speed)
     moving.turning[:] = 0.0
     moving.on(torques, step)
     lift, mass = PAPER_TRUCK.mass * PAPER_TRUCK.height / (2.0 * PAPER_TRUCK.wheelbase), PAPER_TRUCK.mass
-    slowing = (plane.static[2] - load[2]) / lift
-    loads = plane.static + lift * slowing * np.array([1.0, 1.0, -1.0, -1.0])
+    slowing = (plane.static_loads[2] - load[2]) / lift
+    loads = plane.static_loads + lift * slowing * np.array([1.0, 1.0, -1.0, -1.0])
     front = MU * loads[0]
     rear = 0.5 * mass * slowing - front
     report = moving.report

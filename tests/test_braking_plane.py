@@ -7,7 +7,7 @@ from models.brake.advance import AT_REST, advance
 from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
 from models.brake.trailer import CHOSEN_TRAILER, plane_of_trailer, trailer_behind_hook
 from models.engines.braking import EngineChassis
-from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
+from models.tyre.tyre_table import StackedTyreTables, TyreTable, stacked_tables
 from validation.braking.braked_truck import (
     ICE_TABLE,
     RollingTruck,
@@ -101,7 +101,7 @@ def test_the_truck_written_out_turns_as_the_compiled_one():
     assert state[0] == pytest.approx([where.x, where.y, where.heading], abs=2e-3)
 
 
-def rolling(slope: float) -> Tables:
+def rolling(slope: float) -> StackedTyreTables:
     """Friction across the wheel alone, as steep as ``slope`` (1/rad)."""
     mu = np.array([[0.0], [0.01 * slope], [0.01 * slope]])
     nodes = np.array([0.0, 0.01, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])

@@ -22,7 +22,7 @@ from models.brake.port import frame, socket_port
 from models.brake.port.ask import ControllerFailed, checked_command
 from models.brake.port.callable import named_controller
 from models.brake.port.client import serve_controller_at_port
-from models.brake.port.example import ExampleController
+from models.brake.port.example import Example
 from models.brake.port.faults import ControllerFault, FaultyController
 from models.brake.port.pace import WallClockController
 from models.brake.port.sensors import SensorConversion, controller_behind_sensors
@@ -134,15 +134,13 @@ def test_a_thread_at_the_socket_gives_the_same_bits(vehicle):
     answered = []
     with socket_port.listening_socket() as server:
         number = server.getsockname()[1]
-        thread = threading.Thread(
-            target=lambda: answered.append(serve_controller_at_port(ExampleController(4), number))
-        )
+        thread = threading.Thread(target=lambda: answered.append(serve_controller_at_port(Example(4), number)))
         thread.start()
         link = server.accept()[0]
         with link:
             path = vehicle.run(socket_port.SocketPort(link, PATIENT), 11.0, SHORT)
         thread.join(PATIENT)
-    assert same(path, vehicle.run(ExampleController(4), 11.0, SHORT)) and answered == [len(path.times) - 1]
+    assert same(path, vehicle.run(Example(4), 11.0, SHORT)) and answered == [len(path.times) - 1]
     assert (path.pressures[1:] < path.pressures[:-1]).any()  # it did release
 
 
@@ -154,18 +152,19 @@ def test_the_client_in_c_gives_the_same_bits(vehicle, tmp_path):
     subprocess.run(words, check=True)
     with controller_behind_socket([str(program), "{port}"], 0, PATIENT, PATIENT) as other:
         path = vehicle.run(other, 11.0, SHORT)
-    assert same(path, vehicle.run(ExampleController(4), 11.0, SHORT))
+    assert same(path, vehicle.run(Example(4), 11.0, SHORT))
 
 
 def test_an_fmu_gives_the_same_bits(vehicle, tmp_path):
     builder = pytest.importorskip("pythonfmu").FmuBuilder
     file = builder.build_FMU(HERE / "example_slave.py", dest=tmp_path)
     table = PortTable(fmu=Path(file).name, timeout=PATIENT, start=PATIENT)
-    with controller_of_run(
-        table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), ExampleController(4)
-    ) as (other, _):
+    with controller_of_run(table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), Example(4)) as (
+        other,
+        _,
+    ):
         path = vehicle.run(other, 11.0, SHORT)
-    assert same(path, vehicle.run(ExampleController(4), 11.0, SHORT))
+    assert same(path, vehicle.run(Example(4), 11.0, SHORT))
 
 
 @pytest.mark.parametrize(
@@ -187,7 +186,7 @@ def test_a_hostile_fmu_ends_by_name_and_in_time(does, name, tmp_path):
     file = builder.build_FMU(tmp_path / "slave.py", dest=tmp_path)
     table = PortTable(fmu=Path(file).name, timeout=time_out(name, 0.5), start=PATIENT)
     run = ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path)
-    with pytest.raises(ControllerFailed, match=name), controller_of_run(table, run, ExampleController(4)) as (other, _):
+    with pytest.raises(ControllerFailed, match=name), controller_of_run(table, run, Example(4)) as (other, _):
         begun = time.perf_counter()
         checked_command(other, of())
     assert time.perf_counter() - begun < PATIENT
@@ -197,7 +196,7 @@ def test_an_fmu_without_fmpy_names_the_extra(monkeypatch, tmp_path):
     (tmp_path / "a.fmu").touch()
     monkeypatch.setitem(sys.modules, "fmpy", None)
     table, run = PortTable(fmu="a.fmu"), ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path)
-    with pytest.raises(InputError, match=r"twinrig\[fmi\]"), controller_of_run(table, run, ExampleController(4)):
+    with pytest.raises(InputError, match=r"twinrig\[fmi\]"), controller_of_run(table, run, Example(4)):
         pass
 
 
@@ -206,7 +205,7 @@ def test_a_file_that_is_no_fmu(tmp_path):
     table = PortTable(fmu="a.fmu")
     with (
         pytest.raises(InputError, match="no FMU"),
-        controller_of_run(table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), ExampleController(4)),
+        controller_of_run(table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), Example(4)),
     ):
         pass
 
@@ -345,10 +344,7 @@ def test_prints_of_a_controller_leave_standard_output_to_the_results(tmp_path, c
         "        return Command(valves=np.ones(4))\n"
     )
     run = ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path)
-    with controller_of_run(PortTable(callable="talks.py:Talks", start=PATIENT), run, ExampleController(4)) as (
-        other,
-        _,
-    ):
+    with controller_of_run(PortTable(callable="talks.py:Talks", start=PATIENT), run, Example(4)) as (other, _):
         checked_command(other, of())
     said = capfd.readouterr()
     assert said.out == "" and "noise" in said.err
@@ -370,7 +366,7 @@ def test_a_hostile_callable_ends_by_name_and_in_time(kind, tmp_path):
     )
     table = PortTable(callable="hostile.py:Hostile", timeout=time_out(name, 0.3), start=PATIENT)
     run = ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path)
-    with pytest.raises(ControllerFailed, match=name), controller_of_run(table, run, ExampleController(4)) as (other, _):
+    with pytest.raises(ControllerFailed, match=name), controller_of_run(table, run, Example(4)) as (other, _):
         begun = time.perf_counter()
         checked_command(other, of())
     assert time.perf_counter() - begun < PATIENT
@@ -387,7 +383,7 @@ def test_a_callable_that_is_not_made_in_time_or_crashes_as_it_is_made(tmp_path):
         table = PortTable(callable="made.py:Made", start=start)
         with (
             pytest.raises(RunFailed, match=told),
-            controller_of_run(table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), ExampleController(4)),
+            controller_of_run(table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), Example(4)),
         ):
             pass
 
@@ -408,7 +404,7 @@ def test_making_a_controller_may_take_as_long_as_an_answer(kind, tmp_path):
     with (
         chdir(tmp_path),
         pytest.raises(RunFailed, match=r"not made within 0.4 s; .* give start"),
-        controller_of_run(table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), ExampleController(4)),
+        controller_of_run(table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), Example(4)),
     ):
         pass
     assert time.time() - float((tmp_path / "begun").read_text()) < 2 * table.timeout
@@ -427,7 +423,7 @@ def test_an_fmu_that_is_never_ready_ends_as_an_answer_does(tmp_path):
     with (
         chdir(tmp_path),
         pytest.raises(RunFailed, match=r"not made within 0.8 s"),
-        controller_of_run(table, run, ExampleController(4)),
+        controller_of_run(table, run, Example(4)),
     ):
         pass
     assert time.time() - float((tmp_path / "begun").read_text()) < 2 * table.timeout
@@ -445,9 +441,7 @@ def test_a_command_has_as_long_to_connect_and_a_process_started_by_hand_longer(t
     table = PortTable(command=["sleep", "30"], timeout=0.2)
     begun = time.perf_counter()
     with pytest.raises(RunFailed, match=r"nobody connected to .* within 0.2 s; .* give start"):
-        controller_of_run(
-            table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), ExampleController(4)
-        ).__enter__()
+        controller_of_run(table, ControllerRunData(RADIUS, SAMPLING_PERIOD, folder=tmp_path), Example(4)).__enter__()
     assert time.perf_counter() - begun < 2 * table.timeout
     assert PortTable(port=5000).patience > 10 and PortTable(port=5000, start=3.0).patience == 3.0
 
@@ -519,43 +513,38 @@ def test_the_socket_listens_on_this_machine_alone():
 
 def test_a_log_replays_bit_for_bit_and_knows_its_scene(vehicle, tmp_path):
     run = ControllerRunData(RADIUS, SAMPLING_PERIOD, "a scene", tmp_path)
-    with controller_of_run(PortTable(log="a.log"), run, ExampleController(4)) as (own, _):
+    with controller_of_run(PortTable(log="a.log"), run, Example(4)) as (own, _):
         path = vehicle.run(own, 11.0, SHORT)
     with controller_of_run(PortTable(replay="a.log"), run, Says(_raises)) as (replayed, _):
         assert same(path, vehicle.run(replayed, 11.0, SHORT))
     with (
-        controller_of_run(PortTable(replay="a.log"), run, ExampleController(4)) as (replayed, _),
+        controller_of_run(PortTable(replay="a.log"), run, Example(4)) as (replayed, _),
         pytest.raises(RunFailed, match="was asked something else"),
     ):
         vehicle.run(replayed, np.nextafter(11.0, 12.0), SHORT)
     with (
-        controller_of_run(PortTable(replay="a.log"), run, ExampleController(4)) as (replayed, _),
+        controller_of_run(PortTable(replay="a.log"), run, Example(4)) as (replayed, _),
         pytest.raises(RunFailed, match=f"sample {len(path.times) - 1}: a.log has ended"),
     ):
         vehicle.run(replayed, 11.0, SHORT + 0.1)
     with (
         pytest.raises(InputError, match="another scene"),
         controller_of_run(
-            PortTable(replay="a.log"),
-            ControllerRunData(RADIUS, SAMPLING_PERIOD, "another", tmp_path),
-            ExampleController(4),
+            PortTable(replay="a.log"), ControllerRunData(RADIUS, SAMPLING_PERIOD, "another", tmp_path), Example(4)
         ),
     ):
         pass
     (tmp_path / "no.log").write_bytes(b"no")
-    with (
-        pytest.raises(InputError, match="no log"),
-        controller_of_run(PortTable(replay="no.log"), run, ExampleController(4)),
-    ):
+    with pytest.raises(InputError, match="no log"), controller_of_run(PortTable(replay="no.log"), run, Example(4)):
         pass
 
 
 def test_the_wall_clock_changes_no_number_and_counts_overruns(vehicle):
-    clock = WallClockController(ExampleController(4), SAMPLING_PERIOD)
+    clock = WallClockController(Example(4), SAMPLING_PERIOD)
     begun = time.perf_counter()
     path = vehicle.run(clock, 11.0, 0.1)
     assert time.perf_counter() - begun >= 0.1 - 2 * SAMPLING_PERIOD
-    assert same(path, vehicle.run(ExampleController(4), 11.0, 0.1))
+    assert same(path, vehicle.run(Example(4), 11.0, 0.1))
 
     def slow(given):
         time.sleep(0.02 if given.number == 1 else 0.0)
@@ -673,7 +662,7 @@ def test_a_fault_of_a_wheel_that_is_not_there():
     table = PortTable(faults=[ControllerFault(kind="lost", wheels=[4])])
     with (
         pytest.raises(InputError, match="from 0 to 3"),
-        controller_of_run(table, ControllerRunData(RADIUS, SAMPLING_PERIOD), ExampleController(4)),
+        controller_of_run(table, ControllerRunData(RADIUS, SAMPLING_PERIOD), Example(4)),
     ):
         pass
 

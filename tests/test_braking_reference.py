@@ -73,7 +73,7 @@ def test_a_wheel_keeps_its_momentum_whatever_it_does():
 
 def test_loads_at_rest_are_those_of_levers():
     for own in (box(), car()):
-        assert PlainSuspension(own).loads == pytest.approx(plane_of_truck(own.plane).static, rel=1e-9)
+        assert PlainSuspension(own).loads == pytest.approx(plane_of_truck(own.plane).static_loads, rel=1e-9)
 
 
 @pytest.mark.grounds("plain counterpart")

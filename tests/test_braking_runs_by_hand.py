@@ -27,7 +27,7 @@ def scene(speed, duration, **tables):
 def locked_friction(surface):
     """Of a locked wheel of the truck, by wheel."""
     return np.array(
-        [table_of_named_tyre(surface).characteristic_values(float(load))["locked"] for load in PLANE.static]
+        [table_of_named_tyre(surface).characteristic_values(float(load))["locked"] for load in PLANE.static_loads]
     )
 
 
@@ -42,7 +42,7 @@ def test_wheels_that_roll_slow_the_truck_by_the_torques_of_their_brakes(engine):
     torque = np.array([1875.0, 1875.0, 1200.0, 1200.0])
     assert result["torque"][-1] == pytest.approx(torque, rel=1e-12)
     assert result["pressure"][-1] == pytest.approx([1.5] * 4, rel=1e-12)
-    wanted = (torque / PLANE.radius).sum() / (PAPER_TRUCK.mass + (PLANE.spin / PLANE.radius**2).sum())
+    wanted = (torque / PLANE.radius).sum() / (PAPER_TRUCK.mass + (PLANE.spin_inertia / PLANE.radius**2).sum())
     speeds, times = result["rates"][:, 0], result.times
     assert speeds[0] == pytest.approx(12.3, rel=1e-12)
     assert result["turning"][0] == pytest.approx(12.3 / PLANE.radius, rel=1e-12)
@@ -60,8 +60,8 @@ def test_locked_wheels_stop_the_truck_by_their_friction_as_the_scene_scales_it(e
     late = slice(len(result.times) // 3, -2)
     assert not result["turning"][late].any()
     assert -result["force_x"][late] / result["load"][late] == pytest.approx(np.tile(mu, (len(result.times[late]), 1)))
-    assert result["load"][late] == pytest.approx(np.tile(PLANE.static, (len(result.times[late]), 1)), rel=1e-9)
-    slowing = (mu * PLANE.static).sum() / PAPER_TRUCK.mass
+    assert result["load"][late] == pytest.approx(np.tile(PLANE.static_loads, (len(result.times[late]), 1)), rel=1e-9)
+    slowing = (mu * PLANE.static_loads).sum() / PAPER_TRUCK.mass
     assert -np.diff(result["rates"][late, 0]) / np.diff(result.times[late]) == pytest.approx(slowing, rel=1e-6)
     assert result.data.attrs["stands"] == 1 and result["rates"][-1, 0] == pytest.approx(0.0, abs=1e-9)
 

@@ -81,8 +81,12 @@ def test_a_plan_names_what_is_absent_and_what_is_there():
 
 def test_without_load_transfer_and_dynamics_nothing_of_them_is_computed():
     bare, full = braked_vehicle(scene(), scene().procedures["stop"]), load(SCENES / "braking.toml")
-    assert not bare.plane.by_x.any() and not bare.plane.by_y.any() and not bare.chambers.fill_time.any()
-    assert braked_vehicle(full, full.procedures["straight"]).plane.by_x.all()
+    assert (
+        not bare.plane.load_per_x_acceleration.any()
+        and not bare.plane.load_per_y_acceleration.any()
+        and not bare.chambers.fill_time.any()
+    )
+    assert braked_vehicle(full, full.procedures["straight"]).plane.load_per_x_acceleration.all()
 
 
 @pytest.mark.parametrize("radius", [137.0, -137.0])

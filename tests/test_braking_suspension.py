@@ -64,7 +64,9 @@ def test_locked_wheels_pitch_and_load_the_box_as_springs_in_series_do():
 def test_static_loads_are_those_of_levers():
     for own in (box(), car()):
         path = braked_vehicle(own, constant_friction(0.1)).run(steady_torques(0.0, 0.0, 0.0, 0.0), 2.0, 0.05)
-        assert path.reports.load[-1] == pytest.approx(plane_of_truck(own.plane).static, rel=1e-9)  # no drag, no brakes
+        assert path.reports.load[-1] == pytest.approx(
+            plane_of_truck(own.plane).static_loads, rel=1e-9
+        )  # no drag, no brakes
 
 
 def test_mirrored_steering_gives_a_mirrored_stop_and_none_gives_no_yaw():

@@ -54,7 +54,9 @@ def scene(**tables: Any) -> Any:
 def test_loads_are_those_of_levers_and_a_locked_train_stops_by_friction_alone():
     train_of_two = whole.towing_car()
     front, rear, axle, _ = static_loads(train_of_two.handling)
-    assert train_of_two.in_plane().static.reshape(3, 2).sum(axis=1) == pytest.approx([front, rear, axle], rel=1e-9)
+    assert train_of_two.in_plane().static_loads.reshape(3, 2).sum(axis=1) == pytest.approx(
+        [front, rear, axle], rel=1e-9
+    )
     way, wanted = closed.locked_stop_and_closed_form()
     assert way == pytest.approx(wanted, rel=1e-3)  # the car leans ahead by less than a millimetre
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.ride.copies_kernel import COPIES_SIDE_BY_SIDE, Curves, ForceLaws, PushingTyres, march
+from models.ride.copies_kernel import COPIES_SIDE_BY_SIDE, ForceCurves, ForceLaws, PushingTyres, march_copies
 
 pytestmark = pytest.mark.grounds("plain counterpart")
 N, WHEELS, SPRINGS, OUTPUTS, STEPS, STEP = 3, 2, 2, 2, 12, 2e-3
@@ -14,7 +14,7 @@ def curves(random):
     """Curves of every spring: offset, first slope, and bends at corners, the last spring with one less."""
     corners, bends = np.tile(KNOTS, (SPRINGS, 1)), random.normal(size=(SPRINGS, KNOTS.size))
     bends[-1, -1] = 0.0
-    return Curves(random.normal(size=SPRINGS), random.normal(size=SPRINGS), corners, bends)
+    return ForceCurves(random.normal(size=SPRINGS), random.normal(size=SPRINGS), corners, bends)
 
 
 def laws(random):
@@ -79,7 +79,7 @@ def test_states_and_sums_of_powers_are_those_of_whole_arrays():
     start = random.normal(0.0, 0.5, (2 * N, copies))
     roads = random.normal(0.0, 0.3, (2 * STEPS + 1, 2 * WHEELS, copies))
     states, sums = start.copy(), np.zeros((4, OUTPUTS, copies))
-    march(states, roads, STEP, 3, 2, of, sums)
+    march_copies(states, roads, STEP, 3, 2, of, sums)
     end, expected = marched(start, roads, of, 3, 2)
     air = rates(start, roads[0], of)[1][SPRINGS:] != 0.0
     assert air.any() and not air.all()

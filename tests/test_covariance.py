@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.ride.closed_forms import QuarterCar, half_car_acceleration, split_half_car
+from models.ride.closed_forms import QuarterCar, half_car_acceleration, quarter_cars_of_half_car
 from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary_covariance
 from models.ride.excited import DelayedSystem, vehicle_with_road
 from models.ride.frequency import spectral_densities, variances_by_quadrature
-from models.ride.marginal import Unstable, split_marginal
+from models.ride.marginal import UnstableVehicle, split_marginal
 from models.ride.sweep import DIRECT_BY_REQUEST, variance_sweep
 from models.ride.weighting import WEIGHTINGS, system_with_weightings
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.road.two_track import CORRELATION_CASES, road_excitation, road_of_level
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial_linear import linearise
@@ -28,7 +28,7 @@ Q = 1e-4
 def walk(corner=0.0, places=(0.0,)):
     """One track under axles at ``places`` (m), z' = -corner z + w in path."""
     heights = tuple(np.eye(len(places))[:, [i]] for i in range(len(places)))
-    return Excitation(np.array([[-corner]]), np.array([[Q**0.5]]), heights, tuple(places[0] - x for x in places))
+    return RoadExcitation(np.array([[-corner]]), np.array([[Q**0.5]]), heights, tuple(places[0] - x for x in places))
 
 
 def system(A, B, delays=(0.0,), C=None, D=None, independent=False):
@@ -55,7 +55,7 @@ def test_quarter_car_has_its_closed_forms_down_to_a_walking_road(corner):
 @pytest.mark.grounds("closed form")
 def test_half_car_splits_into_quarter_cars():
     a, b, v = 1.2, 1.5, 17.0
-    front, rear, inertia = split_half_car(CORNER, a, b)
+    front, rear, inertia = quarter_cars_of_half_car(CORNER, a, b)
     vehicle = quarter_car_vehicle([(a, front), (-b, rear)], np.diag([front.m_s + rear.m_s, inertia]))
     found = stationary_covariance(vehicle_with_road(vehicle, walk(0.0, (a, -b)), v)).variance[0]
     assert found == pytest.approx(half_car_acceleration(CORNER, v * Q, a, b, v), rel=1e-10)
@@ -252,16 +252,16 @@ def test_results_do_not_depend_on_slycot(free, truck, monkeypatch, installed):
 
 
 def test_an_unstable_vehicle_is_refused_in_words():
-    with pytest.raises(Unstable, match=r"swings at 11\.8\d? Hz grows at a rate of 0\.06\d+ 1/s") as told:
+    with pytest.raises(UnstableVehicle, match=r"swings at 11\.8\d? Hz grows at a rate of 0\.06\d+ 1/s") as told:
         stationary_covariance(vehicle_with_road(quarter_car_vehicle([(0.0, replace(CORNER, c=-5.0))]), walk(0.3), 20.0))
     assert told.value.growth == pytest.approx(0.064, rel=0.01)
-    with pytest.raises(Unstable, match="does not swing"):
+    with pytest.raises(UnstableVehicle, match="does not swing"):
         stationary_covariance(system(np.array([[0.5]]), [np.ones((1, 1))]))
 
 
 def test_a_sweep_names_the_speed_at_which_a_vehicle_is_unstable():
     vehicle = quarter_car_vehicle([(0.0, replace(CORNER, c=-5.0))])
-    with pytest.raises(Unstable, match="must be stable at 20 m/s"):
+    with pytest.raises(UnstableVehicle, match="must be stable at 20 m/s"):
         variance_sweep(lambda speed: vehicle, {"": walk(0.3)}, [20.0])
 
 

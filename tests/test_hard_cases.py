@@ -11,7 +11,7 @@ from models.core import signals
 from models.engines import exudyn as exudyn_engine
 from models.engines import protocol, stability
 from models.rail import equations
-from models.rail.equations import Equations
+from models.rail.equations import WheelsetEquations
 from models.ride import covariance, marginal
 from models.systems.pitch_plane.effects import contact_points as contact_effect
 from models.systems.pitch_plane.effects import lift_off
@@ -154,7 +154,7 @@ def test_tyres_that_pull_are_found(implementation, monkeypatch, tmp_path):
 
 @pytest.mark.parametrize("implementation", IMPLEMENTATIONS)
 def test_a_hard_landing_is_silent_without_both_checks_that_see_it(implementation, monkeypatch, tmp_path):
-    monkeypatch.setattr(Equations, "check_loads", lambda *_: None)
+    monkeypatch.setattr(WheelsetEquations, "check_loads", lambda *_: None)
     assert found(rolling, "step too large for a landing", implementation, tmp_path) == "raised"
     monkeypatch.setattr(equations, "check_resolved", lambda *_: None)
     assert found(rolling, "step too large for a landing", implementation, tmp_path) == "SILENT"

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.bicycle.four_bodies import Ride
+from models.bicycle.four_bodies import BicycleRide
 from models.bicycle.rolling_tyres import RollingBicycle
 from models.bicycle.whipple import load_bicycle
 from models.core.systems import of_table
-from models.rail.flange_climbing import bound_shares, nadal_limit
+from models.rail.flange_climbing import nadal_limit, shares_of_bounds
 from models.rail.wheelset import CHOSEN_WHEELSET
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
@@ -64,7 +64,7 @@ def test_tyres_of_a_rolling_bicycle_go_on_bearing_its_weight(engine):
 @pytest.mark.grounds("closed form")
 def test_energy_that_is_not_accounted_for_is_told_by_that_of_the_start():
     none = np.zeros((3, 9))
-    ride = Ride(np.arange(3.0), none, none, np.array([10.0, 9.0, 8.5]), np.array([0.0, -1.5, -1.25]), 2)
+    ride = BicycleRide(np.arange(3.0), none, none, np.array([10.0, 9.0, 8.5]), np.array([0.0, -1.5, -1.25]), 2)
     assert ride.unaccounted() == pytest.approx(0.05, rel=1e-12)
 
 
@@ -86,7 +86,7 @@ def test_a_wheelset_begins_where_its_scene_says_and_its_rails_carry_the_load(eng
 def test_nadal_s_limit_and_shares_of_a_bound():
     """70 degrees and a friction of 0.3: (tan - mu) / (1 + mu tan) = 1.34. Source: M. J. Nadal (1908)."""
     assert nadal_limit(0.3, math.radians(70.0)) == pytest.approx((2.7474774 - 0.3) / (1.0 + 0.3 * 2.7474774), rel=1e-7)
-    shares = bound_shares(np.array([-3.0, 0.0, 2.0]), np.array([4.0, 0.0, 0.0]))
+    shares = shares_of_bounds(np.array([-3.0, 0.0, 2.0]), np.array([4.0, 0.0, 0.0]))
     assert shares.tolist() == [0.75, 0.0, math.inf]
 
 

@@ -16,12 +16,12 @@ from models.engines.spatial_protocol import EngineKinematics, difference_step
 from models.multibody.numbers import _frame, _put_curves
 from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART, curve_numbers
 from models.multibody.plain.motion import generator
-from models.rail.equations import ROLL, YAW, Equations, Y
+from models.rail.equations import ROLL, YAW, WheelsetEquations, Y
 from models.rail.linear import (
     _contact_kinematics,
     critical_speed_or_reason,
     kalker_matrix,
-    largest_growth,
+    largest_growth_rate,
     linear_matrices,
 )
 from models.rail.wheel_forces import plain_rails
@@ -226,8 +226,8 @@ def test_creepages_of_cones_are_those_of_their_rolling_radii():
 
 def test_at_its_critical_speed_a_motion_neither_grows_nor_dies():
     critical, why = critical_speed_or_reason(W)
-    assert why == "" and abs(largest_growth(W, critical)) < 1e-9 * abs(largest_growth(W, 0.9 * critical))
-    assert largest_growth(W, 0.995 * critical) < 0.0 < largest_growth(W, 1.005 * critical)
+    assert why == "" and abs(largest_growth_rate(W, critical)) < 1e-9 * abs(largest_growth_rate(W, 0.9 * critical))
+    assert largest_growth_rate(W, 0.995 * critical) < 0.0 < largest_growth_rate(W, 1.005 * critical)
 
 
 def test_the_largest_growth_is_that_of_the_roots_of_the_characteristic_polynomial():
@@ -235,12 +235,12 @@ def test_the_largest_growth_is_that_of_the_roots_of_the_characteristic_polynomia
     linear = linear_matrices(W, 50.0)
     (a, b), (c, d) = np.moveaxis(np.array([linear.mass, linear.damping, linear.stiffness]), 0, -1)
     roots = np.roots(np.convolve(a, d) - np.convolve(b, c))
-    assert largest_growth(W, 50.0) == pytest.approx(roots.real.max(), rel=1e-6)
+    assert largest_growth_rate(W, 50.0) == pytest.approx(roots.real.max(), rel=1e-6)
 
 
 def test_the_fastest_rate_of_a_wheelset_is_its_matrix_s_spectral_radius():
     """Gelfand's formula, |A^n|^(1/n), with n = 2^40 by squaring."""
-    equations = Equations(W, 20.0, "linear", 5)
+    equations = WheelsetEquations(W, 20.0, "linear", 5)
     power, logarithm = equations.state_matrix, 0.0
     for doubling in range(40):
         size = np.linalg.norm(power)
@@ -271,7 +271,7 @@ def test_paths_of_a_wheelset_begin_where_their_scene_says_at_speeds_about_the_cr
 
 
 def test_tuples_of_rails_hold_the_fields_of_their_record():
-    rails = Equations(W, 20.0, "linear", 5).rails
+    rails = WheelsetEquations(W, 20.0, "linear", 5).rails
     wheels, (head, *_), strips, cells, middle, _ = plain_rails(rails)
     assert wheels["radius"].tolist() == [W.radius] and head.tolist() == rails.profile.head.tolist()
     assert strips.tolist() == rails.strips.tolist() and cells.tolist() == rails.cells.tolist()

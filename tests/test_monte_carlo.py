@@ -8,7 +8,7 @@ from models.core.errors import InputError
 from models.ride.covariance import stationary_covariance
 from models.ride.monte_carlo import (
     LEGENDRE_MODES,
-    _Cells,
+    _PathCells,
     path_cell,
     variances_along_drive,
     variances_at_constant_speed,
@@ -23,7 +23,7 @@ SEED = 3
 
 def test_both_axles_answer_to_a_cell_with_their_joint_covariance():
     vehicle, road = vehicle_and_road("half_car")
-    cells = _Cells(vehicle, road, None, 6.0)
+    cells = _PathCells(vehicle, road, None, 6.0)
     front, rear = cells.length / 6.0, cells.length / 9.0  # the rear axle comes by faster
     first, second = (cells._cell_transition(duration)[1] for duration in (front, rear))
     modes = np.vstack([first[:, : 2 * LEGENDRE_MODES], second[:, 2 * LEGENDRE_MODES :]])

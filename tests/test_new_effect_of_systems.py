@@ -350,9 +350,9 @@ def test_a_new_profile_and_a_law_that_no_theory_of_the_scene_knows(new_file):
             0.4,
             "{}",
             """
-    from models.contact.material import Falling
+    from models.contact.material import FallingFriction
 
-    return replace(built, falling=Falling(floor=p.floor, decay=0.6, speed=20.0))
+    return replace(built, falling=FallingFriction(floor=p.floor, decay=0.6, speed=20.0))
 """,
         ).text,
     )

@@ -35,12 +35,22 @@ def test_loads_of_a_braked_truck_balance_its_weight_and_its_inertia():
     x, y = plane.place.T
     m, lever = PAPER_TRUCK.mass, PAPER_TRUCK.mass * PAPER_TRUCK.height
     assert plane.masses == pytest.approx([m]) and plane.inertias == pytest.approx([PAPER_TRUCK.yaw_inertia])
-    assert (plane.static.sum(), plane.static @ x, plane.static @ y) == pytest.approx((m * GRAVITY, 0.0, 0.0), abs=1e-8)
-    assert (plane.by_x.sum(), plane.by_x @ x, plane.by_x @ y) == pytest.approx((0.0, -lever, 0.0), abs=1e-9)
-    assert (plane.by_y.sum(), plane.by_y @ y, plane.by_y @ x) == pytest.approx((0.0, -lever, 0.0), abs=1e-9)
-    assert (plane.by_y * y)[:2].sum() == pytest.approx(-0.3 * lever, rel=1e-12)
+    assert (plane.static_loads.sum(), plane.static_loads @ x, plane.static_loads @ y) == pytest.approx(
+        (m * GRAVITY, 0.0, 0.0), abs=1e-8
+    )
+    assert (
+        plane.load_per_x_acceleration.sum(),
+        plane.load_per_x_acceleration @ x,
+        plane.load_per_x_acceleration @ y,
+    ) == pytest.approx((0.0, -lever, 0.0), abs=1e-9)
+    assert (
+        plane.load_per_y_acceleration.sum(),
+        plane.load_per_y_acceleration @ y,
+        plane.load_per_y_acceleration @ x,
+    ) == pytest.approx((0.0, -lever, 0.0), abs=1e-9)
+    assert (plane.load_per_y_acceleration * y)[:2].sum() == pytest.approx(-0.3 * lever, rel=1e-12)
     assert x == pytest.approx([1.42, 1.42, -2.19, -2.19]) and y == pytest.approx([0.95, -0.95, 0.9, -0.9])
-    assert plane.radius == pytest.approx([0.5] * 4) and plane.spin == pytest.approx([13.35, 13.35, 27.0, 27.0])
+    assert plane.radius == pytest.approx([0.5] * 4) and plane.spin_inertia == pytest.approx([13.35, 13.35, 27.0, 27.0])
     assert PAPER_TRUCK.wheelbase == pytest.approx(3.61, rel=1e-12)
 
 

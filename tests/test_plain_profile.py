@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from models.rail.laid_profiles import Profiles, laid_profile
+from models.rail.laid_profiles import CrossSections, laid_profile
 from models.rail.profile_contact import (
     _SUMS,
-    TOUCH,
-    WHEEL_NODE,
-    Pose,
+    TOUCH_RECORD,
+    WHEEL_NODE_RECORD,
+    WheelPose,
     _add_node,
     normal_force_and_axes,
     profile_on_rail,
@@ -24,13 +24,15 @@ DEEP = 2e-10
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_touches_at_random_poses(side):
-    profiles, draw, several = Profiles(), np.random.default_rng(1), 0
+    profiles, draw, several = CrossSections(), np.random.default_rng(1), 0
     profile = laid_profile(profiles, RADIUS)
-    touches = np.zeros(int(profile.head[0].zones), TOUCH)
+    touches = np.zeros(int(profile.head[0].zones), TOUCH_RECORD)
     for shift in SHIFTS:
         z, roll = profiles.first_touch_pose(RADIUS, shift)
         for _ in range(4):
-            pose = Pose(shift, z + draw.uniform(4e-5, 1.5e-4), roll + draw.normal(0.0, 2e-5), draw.uniform(-0.02, 0.02))
+            pose = WheelPose(
+                shift, z + draw.uniform(4e-5, 1.5e-4), roll + draw.normal(0.0, 2e-5), draw.uniform(-0.02, 0.02)
+            )
             profile_on_rail(side, pose, profile, MODULUS, touches)
             expected = plain.contacts_of_wheel(side, pose, profile, MODULUS)
             assert touches["depth"] == pytest.approx(expected["depth"], abs=DEEP)
@@ -44,7 +46,7 @@ def test_touches_at_random_poses(side):
 
 def test_a_node_between_two_zones_adds_to_both():
     """A factor common to all sums would leave every mean: here they are told. Depth 2e-5 m, slope 3/4, zone 1.3."""
-    node, sums = np.array([(0.01, 0.45, 0.0, 1.3)], WHEEL_NODE), np.zeros(3, _SUMS)
+    node, sums = np.array([(0.01, 0.45, 0.0, 1.3)], WHEEL_NODE_RECORD), np.zeros(3, _SUMS)
     at = 2e-5, 1e-3, 0.7, 0.44, 0.75, 4
     for _ in range(2):
         _add_node(node[0], at, 0.02, sums)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.ride.export import state_space
+from models.ride.export import control_state_space
 from models.ride.measures import exceedance_rate, time_share_beyond
 from models.systems.ride import nonlinear
 from models.systems.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_of
@@ -120,7 +120,7 @@ def test_the_system_as_python_control_has_it():
     scene = build(TABLE)
     linear = linearise(vehicle_of(scene))
     system = vehicle_with_road(linear, excitation_of(scene, linear.wheels), 20.0)
-    found = state_space(system)
+    found = control_state_space(system)
     assert found.ninputs == 4 and found.noutputs == len(system.names) and found.input_labels[2] == "w2_1"
     assert np.array_equal(found.A, system.A) and np.array_equal(found.B[:, 2:], system.B[1])
 

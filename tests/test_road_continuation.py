@@ -5,7 +5,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.road import SplineProfile
-from models.road.continuation import continued_road, reference_height, run_in
+from models.road.continuation import continued_road, reference_height, road_with_run_in
 from models.road.polyline import PolylineProfile, polyline_through
 from models.road.study import study_road
 
@@ -95,7 +95,7 @@ def test_wrong_rules_and_distances_are_refused(rule, needed, words):
 
 @pytest.mark.parametrize("length", [0.5, 5.0])
 def test_run_in_starts_at_rest_and_stays_c2(length):
-    road = run_in(ROAD, length)
+    road = road_with_run_in(ROAD, length)
     np.testing.assert_array_equal(road.height_and_slope([-1e6, -2.0, ROAD.start])[0], 0.0)
     np.testing.assert_array_equal(road.height_and_slope([-1e6, -2.0, ROAD.start])[1], 0.0)
     for s in (ROAD.start, ROAD.start + length, STATION[1]):
@@ -104,7 +104,7 @@ def test_run_in_starts_at_rest_and_stays_c2(length):
 
 
 def test_beyond_the_run_in_the_road_is_the_measured_one():
-    road, s = run_in(ROAD, 2.0), np.linspace(ROAD.start + 2.0, ROAD.end, 300)
+    road, s = road_with_run_in(ROAD, 2.0), np.linspace(ROAD.start + 2.0, ROAD.end, 300)
     level = reference_height(ROAD, 2.0)
     height, slope = road.height_and_slope(s)
     np.testing.assert_allclose(height, ROAD.height_and_slope(s)[0] - level, atol=1e-10)
@@ -117,14 +117,14 @@ def test_two_tracks_with_one_reference_keep_their_bank():
     other = SplineProfile.through(STATION, HEIGHT + 0.05)
     level = reference_height(ROAD)
     s = ROAD.start + 6.0
-    heights = [run_in(track, reference_height_value=level).height_slope_at(s)[0] for track in (ROAD, other)]
+    heights = [road_with_run_in(track, reference_height_value=level).height_slope_at(s)[0] for track in (ROAD, other)]
     assert heights[1] - heights[0] == pytest.approx(0.05, abs=1e-10)
 
 
 def test_run_in_and_continuation_may_come_in_either_order():
     s = np.linspace(-3.0, 60.0, 700)
-    one = run_in(continued_road(ROAD, "mirrored", 60.0), 2.0, -200.0).height_and_slope(s)
-    two = continued_road(run_in(ROAD, 2.0, -200.0), "mirrored", 60.0).height_and_slope(s)
+    one = road_with_run_in(continued_road(ROAD, "mirrored", 60.0), 2.0, -200.0).height_and_slope(s)
+    two = continued_road(road_with_run_in(ROAD, 2.0, -200.0), "mirrored", 60.0).height_and_slope(s)
     np.testing.assert_allclose(one[0], two[0], atol=1e-10)
     np.testing.assert_allclose(one[1], two[1], atol=1e-8)
 
@@ -133,10 +133,10 @@ def test_run_in_and_continuation_may_come_in_either_order():
 def test_impossible_run_ins_are_refused(length):
     for reference in (None, 0.0):
         with pytest.raises(InputError, match="run-in length"):
-            run_in(ROAD, length, reference)
+            road_with_run_in(ROAD, length, reference)
 
 
 def test_a_polyline_stays_a_polyline():
-    road = run_in(continued_road(polyline_through(ROAD), "mirrored", 40.0), 2.0)
+    road = road_with_run_in(continued_road(polyline_through(ROAD), "mirrored", 40.0), 2.0)
     assert isinstance(road, PolylineProfile)
     assert road.height_slope_at(-1.0) == (0.0, 0.0)

@@ -25,7 +25,7 @@ from models.identification.problem import (
     measured_channel,
 )
 from models.identification.uncertainty import uncertainty
-from models.rail.equations import Equations
+from models.rail.equations import WheelsetEquations
 from models.rail.limit_cycle import branch_of_orbits, orbit_of_small_amplitude, refined_orbit
 from models.rail.wheelset import CHOSEN_WHEELSET
 from models.systems.pitch_plane.scene import build
@@ -104,7 +104,7 @@ def test_a_branch_of_cycles_is_the_same_by_workers():
     with process_pool(2) as pool:
         runs = []
         for executor in (None, pool):
-            first = orbit_of_small_amplitude(Equations(CHOSEN_WHEELSET, 60.0, cells=5), 1e-3, 1e-3, executor)
+            first = orbit_of_small_amplitude(WheelsetEquations(CHOSEN_WHEELSET, 60.0, cells=5), 1e-3, 1e-3, executor)
             runs.append(
                 [
                     first,

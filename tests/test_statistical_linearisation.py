@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError, RunFailed
-from models.ride.copies_kernel import COPIES_SIDE_BY_SIDE, fill_rates, march
+from models.ride.copies_kernel import COPIES_SIDE_BY_SIDE, fill_state_rates, march_copies
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
 from models.ride.frequency import standard_errors
@@ -201,12 +201,12 @@ def test_a_copy_goes_where_an_engine_goes():
     plain = linearise(vehicle, SPEED, {s.name: (s.stiffness, s.damping) for s in springs})
     laws, x = force_laws(vehicle, plain, springs, SPEED), np.zeros((4, 1))
     sums, force, rate = np.zeros((4, len(plain.outputs), 1)), np.empty((1, 1)), np.empty((4, 1))
-    march(x, table[:, :, None], road.step, 300, 1, laws, sums)
+    march_copies(x, table[:, :, None], road.step, 300, 1, laws, sums)
     assert not sums.any(), "nothing is read before its time"
     assert np.abs(x[:, 0] - [*run.positions[-1], *run.rates[-1]]).max() < 1e-12
-    fill_rates(x.copy(), table[-1:].T.copy(), laws, force, rate, np.empty((2, 1)))
+    fill_state_rates(x.copy(), table[-1:].T.copy(), laws, force, rate, np.empty((2, 1)))
     assert abs(force[0, 0]) > 100.0, "N: the bent laws are at work"
-    march(x, np.repeat(table[-1:, :, None], 3, axis=0), 0.0, 0, 1, laws, sums)
+    march_copies(x, np.repeat(table[-1:, :, None], 3, axis=0), 0.0, 0, 1, laws, sums)
     strut = vehicle.bodies[0].mass * rate[2, 0]  # all that pulls at the body
     assert sums[:, 2, 0] == pytest.approx(strut ** np.arange(1, 5), rel=1e-12)
 
@@ -219,10 +219,10 @@ def test_copies_side_by_side_go_where_each_goes_alone():
     plain = linearise(vehicle, SPEED, {s.name: (s.stiffness, s.damping) for s in springs})
     laws, roads = force_laws(vehicle, plain, springs, SPEED), next(road.blocks(30, copies, 5))
     x, sums = np.zeros((4, copies)), np.zeros((4, len(plain.outputs), copies))
-    march(x, roads, road.step, 0, 4, laws, sums)
+    march_copies(x, roads, road.step, 0, 4, laws, sums)
     for copy in (0, COPIES_SIDE_BY_SIDE - 1, COPIES_SIDE_BY_SIDE, copies - 1):
         one, of_one = np.zeros((4, 1)), np.zeros((4, len(plain.outputs), 1))
-        march(one, roads[:, :, copy : copy + 1].copy(), road.step, 0, 4, laws, of_one)
+        march_copies(one, roads[:, :, copy : copy + 1].copy(), road.step, 0, 4, laws, of_one)
         assert (one[:, 0] == x[:, copy]).all() and (of_one[:, :, 0] == sums[:, :, copy]).all()
 
 

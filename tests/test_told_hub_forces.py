@@ -19,7 +19,7 @@ from models.systems.hub_forces.run import principal_series, run
 from models.systems.hub_forces.scene import COLUMNS_OF_ANGLES, COLUMNS_OF_HUB, HubScene, build
 from models.systems.measured.run import run as run_recording
 from models.systems.measured.scene import build as recording
-from models.tyre.assumptions import assumptions as of_table
+from models.tyre.assumptions import tyre_table_assumptions as of_table
 from models.vehicles.cut_vehicle import cut
 from models.vehicles.vehicle_file import load_vehicle
 from studies.tyre import run as read_tyre

@@ -88,7 +88,7 @@ print(json.dumps(factor_to_si("kN", "force", "", "")))
     assert last_line(code, ROOT) == 1000.0
 
 
-@pytest.mark.parametrize("kernel", ["coefficient_at", "_tabulated", "_narrow_limit", "_long_limit"])
+@pytest.mark.parametrize("kernel", ["coefficient_at", "_tabulated_coefficient", "_narrow_asymptote", "_long_asymptote"])
 def test_linear_creep_compiles_each_of_kalkers_functions_once(coefficients, kernel):
     """Numbers that are written out in a call would give a function each: five times the compilation, 8 s of 20."""
     assert coefficients[kernel] == 1
@@ -104,7 +104,7 @@ from models.contact import linear_theory
 from models.rail.wheel_forces import _linear_forces
 linear = njit(lambda a, b, motion, shear, poisson: _linear_forces(a, b, motion, shear, poisson))
 linear(5e-3, 4e-3, (1e-4, 1e-4, 0.1), 8e10, 0.28)
-names = ("coefficient_at", "_tabulated", "_narrow_limit", "_long_limit")
+names = ("coefficient_at", "_tabulated_coefficient", "_narrow_asymptote", "_long_asymptote")
 print(json.dumps({name: len(getattr(linear_theory, name).signatures) for name in names}))
 """
     return last_line(code, ROOT, NUMBA_CACHE_DIR=str(tmp_path_factory.mktemp("kept")))

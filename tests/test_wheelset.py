@@ -9,29 +9,31 @@ from scipy.optimize import minimize
 
 from models.core.errors import InputError, RunFailed
 from models.rail import equations as eq
-from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
+from models.rail.contact_point import LEFT, RIGHT, ConicalWheel, cone_on_rail
 from models.rail.contact_table import rolling_radius_difference
-from models.rail.eigenvalues import largest_growth as of_all
-from models.rail.equations import Equations
+from models.rail.eigenvalues import largest_growth_rate as of_all
+from models.rail.equations import WheelsetEquations
 from models.rail.equivalent_conicity import harmonic_linearised_conicity
-from models.rail.limit_cycle import attained_cycle, refined_orbit
+from models.rail.limit_cycle import attained_limit_cycle, refined_orbit
 from models.rail.linear import (
     critical_speed,
     gravity_stiffness,
     kinematic_wavelength,
     klingel_wavelength,
-    largest_growth,
+    largest_growth_rate,
     linear_matrices,
 )
-from models.rail.profile_contact import Pose
-from models.rail.wheel_forces import REPORT
+from models.rail.profile_contact import WheelPose
+from models.rail.wheel_forces import REPORT_RECORD
 from models.rail.wheelset import CHOSEN_WHEELSET
 from validation.contact.manchester_references import PUBLISHED_CONTACT, contact_of, placement_at, wheel_sums
 
 SPRINGS = {f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"}
 FREE = CHOSEN_WHEELSET.changed(**SPRINGS)
-CONE = Cone(CHOSEN_WHEELSET.radius, CHOSEN_WHEELSET.half_gauge, CHOSEN_WHEELSET.conicity, CHOSEN_WHEELSET.head_radius)
-POSE = Pose(0.006, 1e-4, -0.004, 0.03)
+CONE = ConicalWheel(
+    CHOSEN_WHEELSET.radius, CHOSEN_WHEELSET.half_gauge, CHOSEN_WHEELSET.conicity, CHOSEN_WHEELSET.head_radius
+)
+POSE = WheelPose(0.006, 1e-4, -0.004, 0.03)
 
 
 def turn(roll, yaw):
@@ -73,7 +75,7 @@ def test_cone_touches_where_its_surface_is_nearest_to_the_axis_of_the_head(side)
 def test_roll_and_equivalent_conicity_are_those_of_the_geometry():
     y = 1e-5
     pose = (y, 0.0, -CHOSEN_WHEELSET.roll_per_displacement * y, 0.0)
-    right, left = (cone_on_rail(side, Pose(*pose), CONE) for side in (RIGHT, LEFT))
+    right, left = (cone_on_rail(side, WheelPose(*pose), CONE) for side in (RIGHT, LEFT))
     assert (right[0], left[0]) == pytest.approx((0.0, 0.0), abs=3e-11)  # second order: tilt y^2 = 7e-12
     assert (right[1] - left[1]) / (2 * y) == pytest.approx(CHOSEN_WHEELSET.equivalent_conicity, rel=1e-6)
     assert CHOSEN_WHEELSET.coned(0.2).equivalent_conicity == pytest.approx(0.2, rel=1e-9)
@@ -87,7 +89,7 @@ def test_klingels_wave():
     klingels = 2 * math.pi * math.sqrt(CHOSEN_WHEELSET.radius * CHOSEN_WHEELSET.half_gauge / CHOSEN_WHEELSET.conicity)
     assert klingel_wavelength(edges) == pytest.approx(klingels, rel=1e-3)
     # All five motions, slow and free: the closed form within the 1e-3 asked for; 2.5e-5 seen.
-    values = np.linalg.eigvals(Equations(FREE, 0.2, "linear").state_matrix)
+    values = np.linalg.eigvals(WheelsetEquations(FREE, 0.2, "linear").state_matrix)
     slow = min(values[values.imag > 0], key=abs)
     assert 2 * math.pi * 0.2 / slow.imag == pytest.approx(klingel_wavelength(FREE), rel=1e-4)
 
@@ -95,10 +97,12 @@ def test_klingels_wave():
 @pytest.mark.grounds("plain counterpart")
 def test_critical_speed():
     speed = critical_speed(CHOSEN_WHEELSET)
-    assert abs(largest_growth(CHOSEN_WHEELSET, speed)) < 1e-9
-    assert largest_growth(CHOSEN_WHEELSET, speed * 1.001) > 0.0 > largest_growth(CHOSEN_WHEELSET, speed * 0.999)
+    assert abs(largest_growth_rate(CHOSEN_WHEELSET, speed)) < 1e-9
+    assert (
+        largest_growth_rate(CHOSEN_WHEELSET, speed * 1.001) > 0.0 > largest_growth_rate(CHOSEN_WHEELSET, speed * 0.999)
+    )
     # The equations with linear creep have what the two motions leave out: 0.4 % less.
-    assert critical_speed(CHOSEN_WHEELSET, partial(of_all, Equations)) == pytest.approx(speed, rel=6e-3)
+    assert critical_speed(CHOSEN_WHEELSET, partial(of_all, WheelsetEquations)) == pytest.approx(speed, rel=6e-3)
     assert critical_speed(CHOSEN_WHEELSET.changed(stiffness_x=8e5)) > speed
     with pytest.raises(InputError, match="stable up to"):
         critical_speed(CHOSEN_WHEELSET.changed(stiffness_x=1e9, stiffness_y=1e9))
@@ -111,7 +115,7 @@ def test_load_is_a_spring_across_and_a_negative_one_in_yaw():
     def fall(y, yaw):
         z = roll = 0.0
         for _ in range(20):
-            right, left = (cone_on_rail(side, Pose(y, z, roll, yaw), CONE)[0] for side in (RIGHT, LEFT))
+            right, left = (cone_on_rail(side, WheelPose(y, z, roll, yaw), CONE)[0] for side in (RIGHT, LEFT))
             z, roll = z - (right + left) / 2, roll - (right - left) / (2 * CHOSEN_WHEELSET.half_gauge)
         return z
 
@@ -126,7 +130,7 @@ def test_load_is_a_spring_across_and_a_negative_one_in_yaw():
 
 @pytest.mark.grounds("closed form")
 def test_nothing_accelerates_at_rest_and_the_rails_carry_the_load():
-    equations = Equations(CHOSEN_WHEELSET, 50.0)
+    equations = WheelsetEquations(CHOSEN_WHEELSET, 50.0)
     path = equations.run(equations.rest, 0.01, 5e-4)
     assert np.abs(equations.rates(equations.rest)[[eq.Y_RATE, eq.Z_RATE, eq.ROLL_RATE, eq.YAW_RATE]]).max() < 1e-9
     contact = path.contacts[0]
@@ -142,7 +146,7 @@ def test_nothing_accelerates_at_rest_and_the_rails_carry_the_load():
 def test_energy_is_what_the_forces_do(law):
     """d(T + U)/dt by the energies' own expressions against the power of the contacts, at a lively state."""
     w = CHOSEN_WHEELSET.changed(damping_x=0.0, damping_y=0.0, damping_z=0.0, flange_clearance=0.02)
-    equations = Equations(w, 40.0, law)
+    equations = WheelsetEquations(w, 40.0, law)
     body = equations.body
     state = np.array([0.006, 9e-5, -0.0004, 0.02, 0.0, 0.3, 0.02, 1.0, -20.0, -90.0])
 
@@ -158,7 +162,7 @@ def test_energy_is_what_the_forces_do(law):
         return kinetic + held - (w.mass * 9.81 + 2 * body.carried_weight) * z
 
     def depths(s):
-        return np.array([cone_on_rail(side, Pose(*s[:4].tolist()), CONE)[0] for side in (RIGHT, LEFT)])
+        return np.array([cone_on_rail(side, WheelPose(*s[:4].tolist()), CONE)[0] for side in (RIGHT, LEFT)])
 
     rates, h = equations.rates(state), 1e-8
     gained = (energy(state + h * rates) - energy(state - h * rates)) / (2 * h)
@@ -172,14 +176,17 @@ def test_energy_is_what_the_forces_do(law):
 
 @pytest.mark.parametrize("shape", [(), (3,), (2, 3)])
 def test_contacts_that_are_not_known_yet_are_no_numbers(shape):
-    contacts = Equations(CHOSEN_WHEELSET, 50.0).empty_contacts(*shape)
-    assert contacts.dtype == REPORT and contacts.shape == (*shape, 2)
-    assert all(np.isnan(contacts[name]).all() for name in REPORT.names)
+    contacts = WheelsetEquations(CHOSEN_WHEELSET, 50.0).empty_contacts(*shape)
+    assert contacts.dtype == REPORT_RECORD and contacts.shape == (*shape, 2)
+    assert all(np.isnan(contacts[name]).all() for name in REPORT_RECORD.names)
 
 
 @pytest.mark.parametrize("law", ["linear", "fastsim"])
 def test_backwards_is_the_mirror_image(law):
-    forwards, backwards = Equations(CHOSEN_WHEELSET, 60.0, law, 11), Equations(CHOSEN_WHEELSET, -60.0, law, 11)
+    forwards, backwards = (
+        WheelsetEquations(CHOSEN_WHEELSET, 60.0, law, 11),
+        WheelsetEquations(CHOSEN_WHEELSET, -60.0, law, 11),
+    )
     start, mirrored = forwards.displaced_state(5e-3), backwards.displaced_state(5e-3)
     one, two = forwards.run(start, 0.1, 5e-4).states, backwards.run(mirrored, 0.1, 5e-4).states
     assert one[:, eq.Y] == pytest.approx(two[:, eq.Y], abs=1e-14)
@@ -188,7 +195,7 @@ def test_backwards_is_the_mirror_image(law):
 
 
 def test_order_of_the_march():
-    equations = Equations(CHOSEN_WHEELSET, 60.0, "linear")
+    equations = WheelsetEquations(CHOSEN_WHEELSET, 60.0, "linear")
     start = equations.displaced_state(5e-3)
     ends = [equations.run(start, 0.1, h).states[-1] for h in (5e-4, 2.5e-4, 1.25e-4)]
     first, second = np.abs(ends[0] - ends[1])[eq.YAW], np.abs(ends[1] - ends[2])[eq.YAW]
@@ -196,7 +203,7 @@ def test_order_of_the_march():
 
 
 def test_wheel_that_lifts_off_has_no_forces_and_comes_back():
-    equations = Equations(CHOSEN_WHEELSET, 40.0, cells=11)
+    equations = WheelsetEquations(CHOSEN_WHEELSET, 40.0, cells=11)
     start = equations.rest.copy()
     start[eq.Z] -= 2e-4
     path = equations.run(start, 0.3, 2e-4)
@@ -208,7 +215,7 @@ def test_wheel_that_lifts_off_has_no_forces_and_comes_back():
 
 
 def test_limit_cycle_above_the_critical_speed():
-    above = refined_orbit(attained_cycle(Equations(CHOSEN_WHEELSET, 75.0, cells=11)), "amplitude")
+    above = refined_orbit(attained_limit_cycle(WheelsetEquations(CHOSEN_WHEELSET, 75.0, cells=11)), "amplitude")
     assert above.stable and above.multiplier < 0.1
     assert CHOSEN_WHEELSET.flange_clearance < above.amplitude < CHOSEN_WHEELSET.flange_clearance + 1.5e-3
     # Creep forces that saturate and a flange make the wave a little shorter or longer than Klingel's: 3 % here.
@@ -218,17 +225,17 @@ def test_limit_cycle_above_the_critical_speed():
     # The motion itself, marched in other steps, comes back to the orbit.
     tops = above.equations.run(above.equations.displaced_state(6e-3), 6.0, 4e-4).states[:, eq.Y]
     assert tops[-1000:].max() == pytest.approx(above.amplitude, rel=1e-4)  # of maxima that fall between two steps
-    assert attained_cycle(Equations(CHOSEN_WHEELSET, 45.0, cells=11)) is None
+    assert attained_limit_cycle(WheelsetEquations(CHOSEN_WHEELSET, 45.0, cells=11)) is None
 
 
 def test_what_cannot_be_is_refused():
-    equations = Equations(CHOSEN_WHEELSET, 50.0, cells=11)
+    equations = WheelsetEquations(CHOSEN_WHEELSET, 50.0, cells=11)
     with pytest.raises(InputError, match="at most"):
         equations.run(equations.rest, 1.0, 5e-3)
     with pytest.raises(InputError, match="did you mean"):
-        Equations(CHOSEN_WHEELSET, 50.0, "fastsimm")
+        WheelsetEquations(CHOSEN_WHEELSET, 50.0, "fastsimm")
     with pytest.raises(InputError, match="speed"):
-        Equations(CHOSEN_WHEELSET, 200.1)
+        WheelsetEquations(CHOSEN_WHEELSET, 200.1)
     with pytest.raises(InputError, match="own weight"):
         CHOSEN_WHEELSET.changed(load=1000.0)
     with pytest.raises(InputError, match="conicity"):
@@ -238,7 +245,7 @@ def test_what_cannot_be_is_refused():
     with pytest.raises(RunFailed, match="leaves the track"):
         equations.run(start, 1.0, 5e-4)
     with pytest.raises(RunFailed, match="mass = 1e-06 kg"):
-        _ = Equations(CHOSEN_WHEELSET.changed(mass=1e-6), 50.0).rest
+        _ = WheelsetEquations(CHOSEN_WHEELSET.changed(mass=1e-6), 50.0).rest
 
 
 def test_first_harmonic_of_a_table():

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from models.rail import equations as eq
-from models.rail.equations import Equations
-from models.rail.joint_forces import JOINTS, joints_from_states, set_joint_forces, table
-from models.rail.laid_profiles import Profiles
+from models.rail.equations import WheelsetEquations
+from models.rail.joint_forces import JOINTS, joint_force_table, joints_from_states, set_joint_forces
+from models.rail.laid_profiles import CrossSections
 from models.rail.wheelset import CHOSEN_WHEELSET
 from validation.wheelset.plain_wheelset import PlainWheelset
 
@@ -26,7 +26,7 @@ def states(wheelset, speed, count, seed=11):
 
 
 def both(speed, law, lean=0.0, wheelset=CHOSEN_WHEELSET):
-    return Equations(wheelset, speed, law, CELLS, lean), PlainWheelset(wheelset, speed, law, CELLS, lean)
+    return WheelsetEquations(wheelset, speed, law, CELLS, lean), PlainWheelset(wheelset, speed, law, CELLS, lean)
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_rates_and_contacts_are_those_of_plain_vectors(speed, law, lean):
 
 def test_joint_forces_of_the_engines_are_the_rails_by_virtual_work():
     compiled, plain = both(25.0, "fastsim")
-    numbers = table(25.0, compiled.rails)
+    numbers = joint_force_table(25.0, compiled.rails)
     for state in states(CHOSEN_WHEELSET, 25.0, 6):
         block = np.concatenate((np.full(JOINTS, 7.0), joints_from_states(state), numbers))
         set_joint_forces(block.ctypes.data, 0.0, JOINTS)
@@ -72,7 +72,7 @@ def test_a_march_is_the_classical_runge_kutta_method_of_the_plain_rates():
 
 def test_profiles_carry_the_load_at_the_height_where_the_springs_bear_no_more():
     """In the middle of the track, without rates: the vertical parts of the normal forces are the load."""
-    compiled = Equations(CHOSEN_WHEELSET.changed(profiles=Profiles()), 40.0, "linear")
+    compiled = WheelsetEquations(CHOSEN_WHEELSET.changed(profiles=CrossSections()), 40.0, "linear")
     state = np.zeros(eq.STATE_COUNT)
     state[eq.Z], state[eq.SPIN] = compiled.body.rest_height, -40.0 / CHOSEN_WHEELSET.radius
     contacts = compiled.at(state[None])[1][0]

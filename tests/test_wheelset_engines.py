@@ -12,10 +12,10 @@ from models.engines.mujoco_march import Marcher
 from models.engines.mujoco_quiet import installed
 from models.engines.wheelset import ExudynWheelset, MujocoWheelset
 from models.rail import equations as eq
-from models.rail.eigenvalues import largest_growth, wavelength
-from models.rail.equations import Equations
+from models.rail.eigenvalues import hunting_wavelength, largest_growth_rate
+from models.rail.equations import WheelsetEquations
 from models.rail.joint_forces import joint_forces, joints_from_states, states_from_joints
-from models.rail.limit_cycle import attained_cycle, refined_orbit, solved_orbit
+from models.rail.limit_cycle import attained_limit_cycle, refined_orbit, solved_orbit
 from models.rail.linear import critical_speed
 from models.rail.wheelset import CHOSEN_WHEELSET
 
@@ -29,7 +29,7 @@ both = pytest.mark.parametrize("engine", ENGINES)
 @both
 @pytest.mark.parametrize("law", ["linear", "fastsim"])
 def test_accelerations_are_those_of_the_equations(engine, law):
-    written, built = Equations(CHOSEN_WHEELSET, 60.0, law), engine(CHOSEN_WHEELSET, 60.0, law)
+    written, built = WheelsetEquations(CHOSEN_WHEELSET, 60.0, law), engine(CHOSEN_WHEELSET, 60.0, law)
     draw = np.random.default_rng(1)
     states = written.rest + LIVELY * draw.normal(size=(100, eq.STATE_COUNT))
     expected = np.array([written.rates(state) for state in states])
@@ -41,7 +41,7 @@ def test_accelerations_are_those_of_the_equations(engine, law):
 
 
 def test_paths_over_a_second():
-    written = Equations(CHOSEN_WHEELSET, 60.0)
+    written = WheelsetEquations(CHOSEN_WHEELSET, 60.0)
     start = written.displaced_state(5e-3)
     paths = [one.run(start, 1.0, 5e-4) for one in (written, *(engine(CHOSEN_WHEELSET, 60.0) for engine in ENGINES))]
     reference, mujoco, exudyn = (path.states for path in paths)
@@ -60,19 +60,22 @@ def test_paths_over_a_second():
 @pytest.mark.grounds("plain counterpart")
 @both
 def test_klingels_wave_and_critical_speed(engine):
-    assert wavelength(engine, CHOSEN_WHEELSET) == pytest.approx(
-        wavelength(Equations, CHOSEN_WHEELSET), rel=1e-6
+    assert hunting_wavelength(engine, CHOSEN_WHEELSET) == pytest.approx(
+        hunting_wavelength(WheelsetEquations, CHOSEN_WHEELSET), rel=1e-6
     )  # 4e-11 seen
-    speed = critical_speed(CHOSEN_WHEELSET, partial(largest_growth, Equations))
-    assert critical_speed(CHOSEN_WHEELSET, partial(largest_growth, engine)) == pytest.approx(
+    speed = critical_speed(CHOSEN_WHEELSET, partial(largest_growth_rate, WheelsetEquations))
+    assert critical_speed(CHOSEN_WHEELSET, partial(largest_growth_rate, engine)) == pytest.approx(
         speed, rel=1e-6
     )  # 2e-10 seen
-    assert critical_speed(CHOSEN_WHEELSET.changed(stiffness_x=2.5e5), partial(largest_growth, Equations)) > 1.01 * speed
+    assert (
+        critical_speed(CHOSEN_WHEELSET.changed(stiffness_x=2.5e5), partial(largest_growth_rate, WheelsetEquations))
+        > 1.01 * speed
+    )
 
 
 @both
 def test_wheels_that_lift_off_come_back_as_in_the_equations(engine):
-    written = Equations(CHOSEN_WHEELSET, 40.0, cells=11)
+    written = WheelsetEquations(CHOSEN_WHEELSET, 40.0, cells=11)
     start = written.rest - 2e-4 * np.eye(eq.STATE_COUNT)[eq.Z]
     path, expected = (one.run(start, 0.1, 2e-4, 5) for one in (engine(CHOSEN_WHEELSET, 40.0, cells=11), written))
     assert (path.contacts["load"][0] == 0.0).all()
@@ -110,8 +113,8 @@ def test_what_cannot_be_is_refused(engine):
 
 @both
 def test_limit_cycle(engine):
-    expected = attained_cycle(Equations(CHOSEN_WHEELSET, 75.0, cells=11))
-    slower = solved_orbit(replace(expected, equations=Equations(CHOSEN_WHEELSET, 74.5, cells=11)), "amplitude")
+    expected = attained_limit_cycle(WheelsetEquations(CHOSEN_WHEELSET, 75.0, cells=11))
+    slower = solved_orbit(replace(expected, equations=WheelsetEquations(CHOSEN_WHEELSET, 74.5, cells=11)), "amplitude")
     guess = replace(slower, equations=engine(CHOSEN_WHEELSET, 75.0, cells=11))
     found = refined_orbit(solved_orbit(guess, "amplitude", is_precise=False), "amplitude")
     half = refined_orbit(expected, "amplitude")

@@ -10,15 +10,15 @@ from models.engines.wheelset import ExudynWheelset, MujocoWheelset
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
 from models.rail.energy import energy_ledger
-from models.rail.equations import Equations
-from models.rail.laid_profiles import Profiles
+from models.rail.equations import WheelsetEquations
+from models.rail.laid_profiles import CrossSections
 from models.rail.linear import klingel_wavelength
-from models.rail.profile_contact import TOUCH, Pose, normal_force_and_axes
-from models.rail.profile_statics import equilibrium, steering_cones
+from models.rail.profile_contact import TOUCH_RECORD, WheelPose, normal_force_and_axes
+from models.rail.profile_statics import static_equilibrium, steering_cones
 from models.rail.wheelset import CHOSEN_WHEELSET
 from validation.contact.manchester_references import SCENE, placement_at
 
-ON_PROFILES = CHOSEN_WHEELSET.changed(profiles=Profiles())
+ON_PROFILES = CHOSEN_WHEELSET.changed(profiles=CrossSections())
 FREE = ON_PROFILES.changed(**{f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"})
 LIVELY = np.array([4e-3, 4e-5, 1e-4, 3e-3, 3.0, 0.05, 0.02, 0.05, 0.05, 0.5])
 FLANGE = math.radians(-45.0)
@@ -28,7 +28,7 @@ def against_table(shifts):
     """Forces within 2 % and places within 0.3 mm of the exact contact, wheel by wheel."""
     for shift in shifts:
         one = placement_at("A-1", shift)
-        found = equilibrium(ON_PROFILES.changed(load=2e4), shift)
+        found = static_equilibrium(ON_PROFILES.changed(load=2e4), shift)
         loads, places = found.loads.reshape(2, -1), found.touches["y"].reshape(2, -1)
         for k, wheel, side in ((0, one.right, 1), (1, one.left, -1)):
             whole = sum(place.normal for place in wheel)
@@ -40,7 +40,7 @@ def against_table(shifts):
 
 def test_two_patches_as_in_the_table():
     against_table([5e-3])
-    parts = equilibrium(ON_PROFILES.changed(load=2e4), 5e-3).loads[:2]
+    parts = static_equilibrium(ON_PROFILES.changed(load=2e4), 5e-3).loads[:2]
     assert 100.0 < parts.min() < 200.0  # 150 N; without the other patch's depression 500 N
 
 
@@ -53,13 +53,13 @@ def test_lateral_force_is_the_slope_of_the_energy():
     """What it takes to hold the smooth wheelset sideways, by the normals and by the energy of load and contacts."""
 
     def energy(shift):
-        one = equilibrium(ON_PROFILES, shift)
+        one = static_equilibrium(ON_PROFILES, shift)
         depth = np.maximum(one.touches["depth"], 0.0)
         return 0.4 * one.loads @ depth - ON_PROFILES.load * one.z
 
     h = 5e-5
     for shift in (3e-3, 6e-3, 9e-3):
-        one, before, after = (equilibrium(ON_PROFILES, shift + part * h) for part in (0.0, -1.0, 1.0))
+        one, before, after = (static_equilibrium(ON_PROFILES, shift + part * h) for part in (0.0, -1.0, 1.0))
         assert one.loads @ one.touches["n_z"] == pytest.approx(ON_PROFILES.load, rel=1e-8)
         across, down = -one.loads * one.touches["n_y"], -one.loads * one.touches["n_z"]
         moment = (one.touches["y"] * down - one.touches["z"] * across).sum()
@@ -69,7 +69,7 @@ def test_lateral_force_is_the_slope_of_the_energy():
 
 
 def test_mirror():
-    equations, draw = Equations(ON_PROFILES, 50.0), np.random.default_rng(3)
+    equations, draw = WheelsetEquations(ON_PROFILES, 50.0), np.random.default_rng(3)
     mirror = np.array([-1, 1, -1, -1, 1, -1, 1, -1, -1, 1])
     for state in equations.rest + LIVELY * draw.normal(size=(20, eq.STATE_COUNT)):
         one, two = equations.rates(state), mirror * equations.rates(mirror * state)
@@ -78,12 +78,12 @@ def test_mirror():
 
 @pytest.mark.parametrize("engine", [MujocoWheelset, ExudynWheelset])
 def test_accelerations_are_those_of_the_equations(engine):
-    written, built = Equations(ON_PROFILES, 50.0), engine(ON_PROFILES, 50.0)
+    written, built = WheelsetEquations(ON_PROFILES, 50.0), engine(ON_PROFILES, 50.0)
     states = written.rest + LIVELY * np.random.default_rng(4).normal(size=(60, eq.STATE_COUNT))
     states[::3, [eq.Y, eq.Z, eq.ROLL]] += [6.5e-3, -6e-4, -1e-3]
     contact, out, seen = written.empty_contacts(), np.empty(eq.STATE_COUNT), []
     for state in states:
-        eq.rates(state, *written.parameters, out, contact)
+        eq.fill_rates(state, *written.parameters, out, contact)
         seen.append(contact.copy())
         expected = out[[eq.Y_RATE, eq.Z_RATE, eq.ROLL_RATE, eq.YAW_RATE, eq.SPIN]]
         found = built.rates(state)[[eq.Y_RATE, eq.Z_RATE, eq.ROLL_RATE, eq.YAW_RATE, eq.SPIN]]
@@ -94,7 +94,7 @@ def test_accelerations_are_those_of_the_equations(engine):
 
 
 def test_paths_over_a_second_with_flange_contact():
-    kinds = (Equations, MujocoWheelset, ExudynWheelset)
+    kinds = (WheelsetEquations, MujocoWheelset, ExudynWheelset)
     built = [kind(ON_PROFILES, 40.0, cells=7) for kind in kinds]
     start = built[0].displaced_state(6e-3)
     start[eq.Y_RATE] = 0.1
@@ -111,7 +111,7 @@ def test_paths_over_a_second_with_flange_contact():
 
 
 def worst(wheelset, speed, law, shift, step, duration):
-    equations = Equations(wheelset, speed, law, 7)
+    equations = WheelsetEquations(wheelset, speed, law, 7)
     found = energy_ledger(equations, equations.run(equations.displaced_state(shift), duration, step))
     return float(np.abs(found.residual).max()), found
 
@@ -132,14 +132,14 @@ def test_ledger_with_friction_and_flange():
 
 
 def test_standstill_reversal_and_lift_off():
-    equations = Equations(ON_PROFILES, 50.0)
+    equations = WheelsetEquations(ON_PROFILES, 50.0)
     _, *given = equations.parameters
     state, contact = equations.displaced_state(5e-3), equations.empty_contacts()
     state[eq.SPIN] = 0.0
     found = []
     for speed in (-1e-9, 0.0, 1e-9):
         out = np.empty(eq.STATE_COUNT)
-        eq.rates(state, speed, *given, out, contact)
+        eq.fill_rates(state, speed, *given, out, contact)
         found.append(out)
     assert np.isfinite(found).all()
     np.testing.assert_allclose(found, np.broadcast_to(found[1], (3, eq.STATE_COUNT)), rtol=1e-6, atol=2e-3)
@@ -147,7 +147,9 @@ def test_standstill_reversal_and_lift_off():
     rates = equations.rates(state)
     assert np.isfinite(rates).all()
     assert rates[eq.SPIN] == 0.0  # nothing touches
-    path = Equations(ON_PROFILES, 40.0, cells=7).run(equations.rest - 2e-4 * np.eye(eq.STATE_COUNT)[eq.Z], 0.05, 2e-4)
+    path = WheelsetEquations(ON_PROFILES, 40.0, cells=7).run(
+        equations.rest - 2e-4 * np.eye(eq.STATE_COUNT)[eq.Z], 0.05, 2e-4
+    )
     assert (path.contacts["load"][0] == 0.0).all()
     assert (path.contacts["load"][-1, [1, 3]] > 0.0).all()
 
@@ -157,8 +159,8 @@ def test_load_passes_between_patches_without_a_jump():
     modulus = float(rails.wheels["modulus"][0])
     loads = []
     for shift in np.arange(4.6e-3, 5.2e-3, 1e-6):
-        touches = np.zeros(4, TOUCH)
-        wf.contact_points(Pose(shift, -1.1e-4, -3.6e-4, 0.0), rails, touches)
+        touches = np.zeros(4, TOUCH_RECORD)
+        wf.contact_points(WheelPose(shift, -1.1e-4, -3.6e-4, 0.0), rails, touches)
         loads.append(
             [normal_force_and_axes(touch.depth, touch.along, touch.across, modulus)[0] for touch in touches[:2]]
         )
@@ -170,7 +172,7 @@ def test_load_passes_between_patches_without_a_jump():
 
 def test_wave_is_that_of_the_cones_that_steer_alike():
     cones = steering_cones(ON_PROFILES, 3e-3)
-    equations = Equations(FREE, 10.0, "linear")
+    equations = WheelsetEquations(FREE, 10.0, "linear")
     path = equations.run(equations.displaced_state(3e-3), 1.8, 4e-4)
     y = path.states[:, eq.Y]
     crossing = path.times[1:][(y[1:] < 0.0) != (y[:-1] < 0.0)]
@@ -181,6 +183,6 @@ def test_wave_is_that_of_the_cones_that_steer_alike():
 
 def test_what_is_no_profile_is_refused():
     with pytest.raises(InputError, match="built in"):
-        equilibrium(CHOSEN_WHEELSET.changed(profiles=Profiles(wheel="S1003")), 0.0)
+        static_equilibrium(CHOSEN_WHEELSET.changed(profiles=CrossSections(wheel="S1003")), 0.0)
     with pytest.raises(InputError, match="cones"):
-        equilibrium(CHOSEN_WHEELSET, 0.0)
+        static_equilibrium(CHOSEN_WHEELSET, 0.0)

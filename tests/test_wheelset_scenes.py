@@ -11,11 +11,11 @@ from models.core.assumptions import broken_of
 from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import named_effects, scene_without
 from models.rail import equations as eq
-from models.rail.eigenvalues import free_wheelset, largest_growth
-from models.rail.equations import Equations
-from models.rail.flange_climbing import bound_shares, nadal_limit
+from models.rail.eigenvalues import free_wheelset, largest_growth_rate
+from models.rail.equations import WheelsetEquations
+from models.rail.flange_climbing import nadal_limit, shares_of_bounds
 from models.rail.limit_cycle import (
-    attained_cycle,
+    attained_limit_cycle,
     branch_of_orbits,
     orbit_of_small_amplitude,
     refined_orbit,
@@ -111,7 +111,7 @@ def test_without_a_critical_speed_the_study_says_so(tmp_path):
     stiff = {"stiffness_x": 1e8, "stiffness_y": 1e8, "damping_x": 1e5, "damping_y": 1e5}
     one = scene(wheelset={"override": stiff}, run={"duration": 0.02, "step": 1e-4})
     assert path_speeds(one) == [80.0]
-    assert critical_speed_or_reason(wheelset_of(one), partial(largest_growth, Equations))[0] is None
+    assert critical_speed_or_reason(wheelset_of(one), partial(largest_growth_rate, WheelsetEquations))[0] is None
     assert "none: the wheelset is stable up to 200 m/s" in wheelset._stability_lines(wheelset_of(one), {})[1]
     found = limit_cycle.run(scene(wheelset={"override": stiff}, run={}), ("reference",), tmp_path, lambda *_: None)
     assert found["answer"] == {"branch": [], "cycles": {}}
@@ -137,13 +137,14 @@ def test_the_study_saves_what_it_says(tmp_path):
 def test_no_critical_speed_is_told_apart():
     with pytest.raises(NoCriticalSpeed) as told:
         critical_speed(
-            free_wheelset(CHOSEN_WHEELSET).changed(mass=1e4, yaw_inertia=3e4), partial(largest_growth, Equations)
+            free_wheelset(CHOSEN_WHEELSET).changed(mass=1e4, yaw_inertia=3e4),
+            partial(largest_growth_rate, WheelsetEquations),
         )
     assert told.value.unstable
 
 
 def test_a_branch_stands_upright_until_flanges_touch():
-    first = orbit_of_small_amplitude(Equations(CHOSEN_WHEELSET, 60.0, cells=7), 1e-3, 5e-4)
+    first = orbit_of_small_amplitude(WheelsetEquations(CHOSEN_WHEELSET, 60.0, cells=7), 1e-3, 5e-4)
     low, high = branch_of_orbits(first, [5e-3, 7.3e-3])
     assert abs(low.speed - first.speed) < 0.01 < 1.0 < high.speed - low.speed
     assert low.multiplier > 0.99 and high.multiplier < 0.2
@@ -154,10 +155,10 @@ def test_a_branch_stands_upright_until_flanges_touch():
 
 
 def test_orbits_that_are_none():
-    assert attained_cycle(Equations(CHOSEN_WHEELSET, 40.0, cells=7), initial_displacement=1e-3) is None
-    orbit = attained_cycle(Equations(CHOSEN_WHEELSET, 75.0, cells=7))
+    assert attained_limit_cycle(WheelsetEquations(CHOSEN_WHEELSET, 40.0, cells=7), initial_displacement=1e-3) is None
+    orbit = attained_limit_cycle(WheelsetEquations(CHOSEN_WHEELSET, 75.0, cells=7))
     with pytest.raises(RunFailed, match="no periodic motion"):
-        solved_orbit(replace(orbit, equations=Equations(CHOSEN_WHEELSET, 20.0, cells=7)), "amplitude")
+        solved_orbit(replace(orbit, equations=WheelsetEquations(CHOSEN_WHEELSET, 20.0, cells=7)), "amplitude")
 
 
 def test_what_the_scene_does_not_name_is_absent():
@@ -175,7 +176,7 @@ def test_limit_of_climbing() -> None:
     """Without friction a flange climbs only beyond the tangent of its angle; a wheel without load climbs at once."""
     assert nadal_limit(0.0) == pytest.approx(np.tan(np.radians(70.0)), rel=1e-15)
     force, load = np.array([0.0, 0.0, -2e4, 1e3]), np.array([0.0, 1e4, 1e4, 0.0])
-    assert bound_shares(force, load).tolist() == [0.0, 0.0, 2.0, np.inf]
+    assert shares_of_bounds(force, load).tolist() == [0.0, 0.0, 2.0, np.inf]
 
 
 def test_the_flange_of_a_cone_is_not_silently_unread_beside_profiles() -> None:

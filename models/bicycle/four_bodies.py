@@ -20,7 +20,7 @@ FALLEN_LEAN = 1.4
 
 
 @dataclass(frozen=True, eq=False)
-class Ride:
+class BicycleRide:
     """Result of a bicycle run: times (n,) in s, positions and rates (n, 9), energy (n,) and work (n,) of tyres and
     control since the start (J), and the number of steps; reports (n, 2, REPORTED) of the tyres, None for ideally
     rolling wheels.
@@ -39,7 +39,7 @@ class Ride:
         return float(np.abs(self.energy - self.work - self.energy[0]).max() / abs(self.energy[0]))
 
 
-def four_bodies(bicycle: Whipple) -> SpatialVehicle:
+def bicycle_of_four_bodies(bicycle: Whipple) -> SpatialVehicle:
     """The bicycle's bodies in tree order, as a vehicle description in the design position with the steering axis
     upright.
     """

@@ -1,6 +1,7 @@
 """Independent reference: the nonlinear bicycle with ideally rolling wheels, in hand-written equations.
 
-Bodies move by products of matrices (``models.multibody.plain``); coordinates are those of ``four_bodies``. Each wheel
+Bodies move by products of matrices (``models.multibody.plain``); coordinates are those of ``bicycle_of_four_bodies``.
+Each wheel
 touches the ground in its lowest point, whose material point has no velocity: six conditions J(q) v = 0 on nine rates.
 The rates of lean, steer and rear wheel are free, v = N(q) u, and the multipliers drop out of N' (M dv/dt - f) = 0. No
 kernel and no engine takes part.
@@ -19,12 +20,12 @@ from models.bicycle.four_bodies import (
     REAR,
     STEER,
     YAW,
-    Ride,
+    BicycleRide,
     X,
     Y,
-    four_bodies,
+    bicycle_of_four_bodies,
 )
-from models.bicycle.whipple import NO_CONTROL, Control, Whipple
+from models.bicycle.whipple import NO_CONTROL, SteeringControl, Whipple
 from models.core.errors import RunFailed
 from models.multibody.plain.motion import BIAS, FIRST_DERIVATIVE, PLACE, RATE, Bodies, PlainMotion
 
@@ -35,8 +36,8 @@ UPWARD = np.array([0.0, 0.0, 1.0])
 class IdealBicycle:
     """The bicycle as four bodies with ideally rolling wheels; raises the same errors as ``Whipple``."""
 
-    def __init__(self, bicycle: Whipple, control: Control = NO_CONTROL) -> None:
-        vehicle = four_bodies(bicycle)
+    def __init__(self, bicycle: Whipple, control: SteeringControl = NO_CONTROL) -> None:
+        vehicle = bicycle_of_four_bodies(bicycle)
         self.bicycle, self.control, self.bodies = bicycle, control, Bodies(vehicle)
         self.gravity = -bicycle.gravity * UPWARD
         self._masses = np.array([body.mass for body in vehicle.bodies])
@@ -109,7 +110,9 @@ class IdealBicycle:
         levels = motion.matrices[1:, PLACE, 2, 3]
         return float(0.5 * v @ mass @ v + self.bicycle.gravity * self._masses @ levels)
 
-    def run(self, start_state: np.ndarray, duration: float, row_count: int = 501, tolerance: float = 1e-9) -> Ride:
+    def run(
+        self, start_state: np.ndarray, duration: float, row_count: int = 501, tolerance: float = 1e-9
+    ) -> BicycleRide:
         """Integrate the motion from a state (12,) over a duration (s) by DOP853; RunFailed if the bicycle falls to the
         ground.
         """
@@ -129,15 +132,15 @@ class IdealBicycle:
         v = np.array([self.rolling(row[:COUNT], row[COUNT:])[1] for row in solution.y.T])
         energy = np.array([self.energy(*row) for row in zip(q, v, strict=True)])
         work = cumulative_simpson([self.applied(row) @ row for row in v], x=times, initial=0.0)
-        return Ride(times, q, v, energy, work, solution.nfev)
+        return BicycleRide(times, q, v, energy, work, solution.nfev)
 
 
 def _wheel_contact(wheel_matrices: np.ndarray, radius: float) -> tuple[float, np.ndarray, np.ndarray]:
     """Height (m) of a wheel's material point at the ground, Jacobian (3, 9) of its velocity, and its acceleration (3,)
     without dv/dt.
 
-    wheel_matrices (12, 3, 4) : its matrices. The point s that touches, in the wheel's axes, runs on by s' while it rolls, and
-    the rate of its velocity R' s + c' is R'' s + c'' + R' s'.
+    wheel_matrices (12, 3, 4) : its matrices. The point s that touches, in the wheel's axes, runs on by s' while it
+    rolls, and the rate of its velocity R' s + c' is R'' s + c'' + R' s'.
     """
     axes, moving = wheel_matrices[PLACE, :, :3], wheel_matrices[RATE, :, :3]
     axle, turning = axes[:, 1], moving[:, 1]

@@ -1,7 +1,7 @@
 """Whipple's bicycle for an engine: bodies behind joints, and compiled forces of both tyres and of the steering control.
 
-Bodies and coordinates are those of ``four_bodies``; the table is laid out as ``models.multibody.forces`` reads it, with
-the control's numbers in place of a car's.
+Bodies and coordinates are those of ``bicycle_of_four_bodies``; the table is laid out as ``models.multibody.forces``
+reads it, with the control's numbers in place of a car's.
 
 Each tyre is that of handling (``models.tyre.bristles``) on the wheel's lowest point, R from its centre in its plane:
 its load N = N0 + k (R cos lean - height) - c (its rate), N0 the load at rest, has the potential N^2 / 2 k. Stiffness s
@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydantic import Field
 
-from models.bicycle.four_bodies import COUNT, FRONT, LEAN, PITCH, REAR, STEER, four_bodies
-from models.bicycle.whipple import NO_CONTROL, Control, Whipple
+from models.bicycle.four_bodies import COUNT, FRONT, LEAN, PITCH, REAR, STEER, bicycle_of_four_bodies
+from models.bicycle.whipple import NO_CONTROL, SteeringControl, Whipple
 from models.contact.fastsim_many import LOAD, MU, A, B
 from models.core.errors import InputError
 from models.core.strict import Strict, quantity
@@ -38,7 +38,7 @@ from models.multibody.forces import (
 )
 from models.multibody.moving_vehicle import WheelContact, carried_velocity
 from models.multibody.tree import cross, dot, plus, put, three, times
-from models.tyre.bristles import FIRST_FLEXIBILITY, cornering_stiffness_factor, net, tyre_forces
+from models.tyre.bristles import FIRST_FLEXIBILITY, cornering_stiffness_factor, patch_grid, tyre_forces
 from models.vehicles.free_vehicle import joints
 from models.vehicles.spatial import SpatialVehicle
 
@@ -73,7 +73,7 @@ class RollingBicycle:
 
     bicycle: Whipple
     tyre: BicycleTyre = UNCHANGED_TYRE
-    control: Control = NO_CONTROL
+    control: SteeringControl = NO_CONTROL
     vehicle: SpatialVehicle = field(init=False)
     numbers: np.ndarray = field(init=False)
 
@@ -89,7 +89,7 @@ class RollingBicycle:
                 if not value > 0.0:
                     allowed = "must be above 0 in engines, whose every body has inertia; linear equations take 0"
                     raise InputError("", f"{name}.{key}", value, allowed)
-        object.__setattr__(self, "vehicle", four_bodies(self.bicycle))
+        object.__setattr__(self, "vehicle", bicycle_of_four_bodies(self.bicycle))
         object.__setattr__(self, "numbers", _table(self))
 
     @property
@@ -117,7 +117,7 @@ class RollingBicycle:
 
 def _table(bicycle: RollingBicycle) -> np.ndarray:
     """Table of all numbers that the bicycle's compiled forces read."""
-    c, patch, rows = bicycle.control, net(bicycle.tyre.cells), joints(bicycle.vehicle)
+    c, patch, rows = bicycle.control, patch_grid(bicycle.tyre.cells), joints(bicycle.vehicle)
     counts = [len(body.freedoms) for body in bicycle.vehicle.bodies for _ in body.freedoms]
     rows[[REAR, FRONT], tree.KIND] = tree.LOOSE
     positions = {body.name: body.position for body in bicycle.vehicle.bodies}

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.bicycle.weave import Observation
-from models.bicycle.whipple import Control, Whipple
+from models.bicycle.weave import WeaveObservation
+from models.bicycle.whipple import SteeringControl, Whipple
 from models.core.errors import InputError
 from models.identification.subsets import CandidateParameter, SubsetChoice
 from models.identification.subsets import ranked_subsets as chosen_of
@@ -24,26 +24,26 @@ SUSPECTED_PARAMETERS = {
     "speed_gain": CandidateParameter(1.0),
     "speed_bias": CandidateParameter(0.0),
 }
-"""Parameters of a bicycle's control that may explain a deviation from measurement, keys of ``Control``."""
+"""Parameters of a bicycle's control that may explain a deviation from measurement, keys of ``SteeringControl``."""
 FRICTION_SETS = {"friction of either kind": ("friction", "dry_friction")}
 UNIT_OF_SUSPECT = {"friction": "N m s/rad", "dry_friction": "N m", "speed_bias": "m/s"}
-NO_WEAVE = -20.0 + 0.0j
+EIGENVALUE_WITHOUT_WEAVE = -20.0 + 0.0j
 """Eigenvalue (1/s) that replaces the weave of a model whose weave does not oscillate."""
 
 
-def predicted_weave(bicycle: Whipple, control: Control, observation: Observation) -> np.ndarray:
+def predicted_weave(bicycle: Whipple, control: SteeringControl, observation: WeaveObservation) -> np.ndarray:
     """Prediction (3,) of a bicycle model at a measured speed: real and imaginary part of the weave eigenvalue (1/s),
     and measured speed (m/s).
     """
     weave = bicycle.weave(observation.speed, control.viscous(float(observation.inverse_steer_rate.mean())))
-    weave = weave if np.isfinite(weave) else NO_WEAVE
+    weave = weave if np.isfinite(weave) else EIGENVALUE_WITHOUT_WEAVE
     return np.array([weave.real, weave.imag, control.speed_gain * observation.speed + control.speed_bias])
 
 
 def ranked_suspects(
     bicycle: Whipple,
-    base_control: Control,
-    observations: Sequence[Observation],
+    base_control: SteeringControl,
+    observations: Sequence[WeaveObservation],
     parameter_names: Sequence[str] = tuple(SUSPECTED_PARAMETERS),
 ) -> SubsetChoice:
     """Fits of every subset of the suspected control parameters, ranked; InputError for fewer than two speeds, or an
@@ -67,7 +67,7 @@ def ranked_suspects(
 
 
 def averaged_weave(
-    bicycle: Whipple, base_control: Control, subset_choice: SubsetChoice, observation: Observation
+    bicycle: Whipple, base_control: SteeringControl, subset_choice: SubsetChoice, observation: WeaveObservation
 ) -> tuple[np.ndarray, np.ndarray]:
     """Real and imaginary part (2,) of the weave eigenvalue (1/s), averaged over all subsets of parameters with their
     weights, and their standard deviations (2,).
@@ -78,7 +78,7 @@ def averaged_weave(
 
 
 def forecast_deviations(
-    bicycle: Whipple, base_control: Control, subset_choice: SubsetChoice, observation: Observation
+    bicycle: Whipple, base_control: SteeringControl, subset_choice: SubsetChoice, observation: WeaveObservation
 ) -> np.ndarray:
     """Forecast less measured real and imaginary part of the weave (2,), divided by the standard deviation of
     measurement and forecast together.
@@ -87,7 +87,7 @@ def forecast_deviations(
     return np.asarray((mean - observation.mean[:2]) / np.hypot(observation.deviation[:2], deviation))
 
 
-def _sensor_error(observations: Sequence[Observation]) -> float:
+def _sensor_error(observations: Sequence[WeaveObservation]) -> float:
     """Standard deviation (m/s) of the speed sensor's means about a fitted line; 0 for two speeds, which any line
     fits.
     """
@@ -98,7 +98,7 @@ def _sensor_error(observations: Sequence[Observation]) -> float:
     return float(np.sqrt(np.sum(left**2) / (len(observations) - 2)))
 
 
-def _whitening_matrix(observation: Observation, sensor_error: float) -> np.ndarray:
+def _whitening_matrix(observation: WeaveObservation, sensor_error: float) -> np.ndarray:
     """Matrix (3, 3) that maps deviations from the prediction to independent standard normal ones; the error of the
     speed sensor counts as independent.
     """

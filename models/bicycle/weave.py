@@ -24,7 +24,7 @@ COLUMN_HEADINGS = ("lean_rate", "fork_rate", "speed")
 
 
 @dataclass(frozen=True, eq=False)
-class Observation:
+class WeaveObservation:
     """Measurements of the weave in windows (n,) at one speed (m/s) of the treadmill.
 
     weave : eigenvalues (1/s); measured_speed : mean of the speed sensor (m/s); inverse_steer_rate : mean of |steer
@@ -79,7 +79,7 @@ def decaying_sinusoid(rate_samples: np.ndarray, sampling_rate: float = SAMPLING_
     return complex(best.x[0], abs(best.x[1]))
 
 
-def observations(data_folder: str | Path) -> list[Observation]:
+def read_observations(data_folder: str | Path) -> list[WeaveObservation]:
     """Observations of the weave from a folder, by ascending speed; InputError with file, position and value where it
     cannot be read.
     """
@@ -102,7 +102,7 @@ def observations(data_folder: str | Path) -> list[Observation]:
         if len(of_speed) < 3:
             allowed = f"has {len(of_speed)} window(s); a scatter needs 3 or more"
             raise InputError(data_folder / "windows.csv", "speed [m/s]", speed, allowed)
-    return [Observation(speed, *map(np.array, zip(*by_speed[speed], strict=True))) for speed in sorted(by_speed)]
+    return [WeaveObservation(speed, *map(np.array, zip(*by_speed[speed], strict=True))) for speed in sorted(by_speed)]
 
 
 def _rows_of_windows(windows_path: Path) -> list[tuple[str, float, int, int]]:

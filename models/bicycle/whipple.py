@@ -5,7 +5,7 @@ x forward, y to the right, z down; lean to the right and steer to the right are 
 
     M q'' + (v C1 + D) q' + (g K0 + v^2 K2) q = (lean torque, steer torque),
 
-D (v) what control and friction add (``Control``).
+D (v) what control and friction add (``SteeringControl``).
 """
 
 from functools import cached_property
@@ -29,7 +29,7 @@ HIGHEST_SPEED = 100.0
 """Highest speed (m/s) at which eigenvalues are computed, in either direction."""
 
 
-class Wheel(Strict):
+class BicycleWheel(Strict):
     """A bicycle wheel. Its inertia about all axes across the axle is one number; zero inertia is allowed."""
 
     radius: float = quantity("m", "of the wheel")
@@ -38,7 +38,7 @@ class Wheel(Strict):
     Iyy: float = quantity("kg m^2", "about the axle", zero=True)
 
     @model_validator(mode="after")
-    def _possible(self) -> "Wheel":
+    def _possible(self) -> "BicycleWheel":
         if self.Iyy > MEASURED_INERTIA_FACTOR * 2.0 * self.Ixx:
             allowed = (
                 f"must be at most 2 Ixx = {2.0 * self.Ixx:g} kg m^2, {MEASURED_INERTIA_FACTOR - 1.0:.0%} "
@@ -48,7 +48,7 @@ class Wheel(Strict):
         return self
 
 
-class Frame(Strict):
+class BicycleFrame(Strict):
     """A bicycle's rear frame with a rigid rider, or its front frame; where Iyy is missing it is Ixx + Izz, as for a
     flat body.
     """
@@ -62,7 +62,7 @@ class Frame(Strict):
     Ixz: float = quantity("kg m^2", "product of inertia, -int x z dm", default=0.0, signed=True)
 
     @model_validator(mode="after")
-    def _possible(self) -> "Frame":
+    def _possible(self) -> "BicycleFrame":
         if self.Ixz**2 > self.Ixx * self.Izz * (1.0 + 1e-9):
             raise ValueError(f"Ixz must be at most {np.sqrt(self.Ixx * self.Izz):g} kg m^2, the root of Ixx Izz")
         if self.Iyy is not None and self.Iyy > MEASURED_INERTIA_FACTOR * (self.Ixx + self.Izz):
@@ -76,7 +76,7 @@ class Frame(Strict):
         return np.array([[self.Ixx, 0.0, self.Ixz], [0.0, across, 0.0], [self.Ixz, 0.0, self.Izz]])
 
 
-class Control(Strict):
+class SteeringControl(Strict):
     """Steering control and friction of the bicycle, with the errors of its sensors and motor.
 
     Steer torque = torque_gain gain (until - measured speed) lean rate - friction steer rate - dry_friction of the steer
@@ -101,7 +101,7 @@ class Control(Strict):
         missing = max(self.until - self.speed_gain * abs(speed) - self.speed_bias, 0.0)
         return self.torque_gain * self.gain * missing
 
-    def viscous(self, inverse_steer_rate: float) -> "Control":
+    def viscous(self, inverse_steer_rate: float) -> "SteeringControl":
         """The same control with viscous in place of dry friction, which does the same work in a given motion of the
         steering.
 
@@ -111,7 +111,7 @@ class Control(Strict):
         return self.model_copy(update={"friction": added, "dry_friction": 0.0})
 
 
-NO_CONTROL = Control()
+NO_CONTROL = SteeringControl()
 """Steering without control and without friction."""
 
 
@@ -131,10 +131,10 @@ class Whipple(Strict):
     trail: float = quantity("m", "how far the front contact lies behind the steering axis on the ground", signed=True)
     tilt: float = Field(ge=-LARGEST_TILT, le=LARGEST_TILT, description="of the steering axis, top to the rear, rad")
     gravity: float = quantity("m/s^2", "gravity", default=9.81, zero=True)
-    rear_wheel: Wheel
-    body: Frame
-    front_frame: Frame
-    front_wheel: Wheel
+    rear_wheel: BicycleWheel
+    body: BicycleFrame
+    front_frame: BicycleFrame
+    front_wheel: BicycleWheel
 
     def changed(self, **values: Any) -> "Whipple":
         """The bicycle with some parameters changed, checked as when it is read from a file."""
@@ -178,7 +178,7 @@ class Whipple(Strict):
         K2 = np.array([[0.0, (ST - mass * zT) * cosine / w], [0.0, (SA + SF * sine) * cosine / w]])
         return LinearBicycle(M, C1, K0, K2)
 
-    def state_matrix(self, speed: float, control: Control = NO_CONTROL) -> np.ndarray:
+    def state_matrix(self, speed: float, control: SteeringControl = NO_CONTROL) -> np.ndarray:
         """State matrix (4, 4) of (lean, steer, lean rate, steer rate) at a speed (m/s) of either sign."""
         M, C1, K0, K2 = self.linear
         damping = speed * C1 + np.array([[0.0, 0.0], [-control.lean_rate_gain(speed), control.friction]])
@@ -186,13 +186,13 @@ class Whipple(Strict):
         lower_rows = np.linalg.solve(M, -np.hstack([stiffness, damping]))
         return np.vstack([np.eye(2, 4, 2), lower_rows])
 
-    def eigenvalues(self, speed: float, control: Control = NO_CONTROL) -> np.ndarray:
+    def eigenvalues(self, speed: float, control: SteeringControl = NO_CONTROL) -> np.ndarray:
         """Eigenvalues (4,) in 1/s of the linear bicycle at a speed (m/s), sorted by real, then imaginary part."""
         if not abs(speed) <= HIGHEST_SPEED:
             raise InputError("", "speed", speed, f"must be from -{HIGHEST_SPEED:g} to {HIGHEST_SPEED:g} m/s")
         return np.sort_complex(np.linalg.eigvals(self.state_matrix(speed, control)))
 
-    def weave(self, speed: float, control: Control = NO_CONTROL) -> complex:
+    def weave(self, speed: float, control: SteeringControl = NO_CONTROL) -> complex:
         """Eigenvalue (1/s) of the weave: the oscillatory one with positive imaginary part, the faster one of two; NaN
         if there is none.
         """
@@ -260,8 +260,8 @@ def _positive_roots(condition: Polynomial) -> list[float]:
 def load_bicycle(
     bicycle_name: str, scene_folder: str | Path = ".", scene_path: str = "", key_path: str = "bicycle"
 ) -> Whipple:
-    """The bicycle's parameter set with this name, or in a TOML file with all parameters; ``scene_path`` and ``key_path`` name
-    the scene in error messages.
+    """The bicycle's parameter set with this name, or in a TOML file with all parameters; ``scene_path`` and
+    ``key_path`` name the scene in error messages.
     """
     sets = {path.stem: path for path in sorted(PARAMETER_SET_FOLDER.glob("*.toml"))}
     if bicycle_name not in sets and not bicycle_name.endswith(".toml"):

@@ -98,7 +98,7 @@ def advance(vehicle_motion, brake_torques, time_step, steer_angles, vehicle):
     """Advance a ``PlaneMotion`` by n steps (s) under torques (n + 1, W) in N m at the steps' ends, which come from
     ``pressure``.
 
-    steer (W,): rad; vehicle: ``OnRoad``. Returns how it ended and the time (s) that passed.
+    steer_angles (W,): rad; vehicle: ``VehicleOnRoad``. Returns how it ended and the time (s) that passed.
     """
     wheels, time = vehicle_motion.turning.size, 0.0
     surfaces = surfaces_of_rows(array(doubles(4 * wheels), (4, wheels)))
@@ -167,7 +167,11 @@ def _unit_acceleration(
     axes.
     """
     accelerations = vehicle_motion.accelerations
-    k, row_along, across = plane_vehicle.group[first_wheel], np.zeros(accelerations.size), np.zeros(accelerations.size)
+    k, row_along, across = (
+        plane_vehicle.load_unit[first_wheel],
+        np.zeros(accelerations.size),
+        np.zeros(accelerations.size),
+    )
     units = np.column_stack((np.cos(vehicle_motion.state[0, 2:]), np.sin(vehicle_motion.state[0, 2:])))
     bias_along, bias_across = fill_velocity_rows(
         ChainPoint(k, 0.0, 0.0), Direction(*units[k]), units, vehicle_motion.state[1], plane_vehicle, row_along, across
@@ -188,7 +192,12 @@ def _tipping_sentence(
     body, (deceleration, side_acceleration) = BODY_NAMES[unit_wheels.start // 4], unit_accelerations
     static, by_x, by_y, y = (
         wheel_values[unit_wheels]
-        for wheel_values in (plane_vehicle.static, plane_vehicle.by_x, plane_vehicle.by_y, plane_vehicle.place[:, 1])
+        for wheel_values in (
+            plane_vehicle.static_loads,
+            plane_vehicle.load_per_x_acceleration,
+            plane_vehicle.load_per_y_acceleration,
+            plane_vehicle.place[:, 1],
+        )
     )
     if status == PITCHED_OVER:
         axle = 0 if wheel_loads[unit_wheels][:2].max() <= 0.0 else 2

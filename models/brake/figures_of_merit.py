@@ -129,8 +129,8 @@ def adhesion_trailer(z: float, train_weight: float, axle_load: float) -> float:
     """Adhesion coefficient k = z P g / F_dyn of one trailer axle, from the braking rate z of the train (weight in N)
     when only that axle brakes.
 
-    load: F_dyn, N. The formula is ours. Rolling resistance is not subtracted, because wheels have none here; that of a
-    whole train would be a third of the force of one axle on ice.
+    axle_load: F_dyn, N. The formula is ours. Rolling resistance is not subtracted, because wheels have none here; that
+    of a whole train would be a third of the force of one axle on ice.
     """
     return round(z * train_weight / axle_load, 3)
 
@@ -179,8 +179,9 @@ def wheel_lock_times(
     vehicle_speeds: np.ndarray,
     least_speed: float = 15.0 * METRES_PER_SECOND_OF_KMH,
 ) -> WheelLockTimes:
-    """Locked times of the wheels while the vehicle is above a speed (m/s). lengths (n,): durations of the samples (s);
-    locked (n, W): whether a wheel is locked; speeds (n,): of the vehicle (m/s).
+    """Locked times of the wheels while the vehicle is above a speed (m/s). sample_durations (n,): durations of the
+    samples (s);
+    is_locked (n, W): whether a wheel is locked; vehicle_speeds (n,): of the vehicle (m/s).
 
     UN R13, Annex 13 lets wheels lock below 15 km/h, and briefly above; not checked against the text of the regulation.
     """

@@ -60,7 +60,9 @@ def chain_point_position(chain_point, coordinate_positions, arm_lengths):
 
 @inlined
 def count_of_coordinates(plane_vehicle):
-    """Number of coordinates of a ``Plane``; for a single unit a constant that compiled functions know beforehand."""
+    """Number of coordinates of a ``PlaneVehicle``; for a single unit a constant that compiled functions know
+    beforehand.
+    """
     return 2 + len(plane_vehicle.units)
 
 
@@ -92,7 +94,7 @@ def fill_velocity_rows(chain_point, direction, heading_vectors, coordinate_rates
     row_along[0], row_along[1], row_across[0], row_across[1] = c, s, -s, c
     bias_along, bias_across = 0.0, 0.0
     for j in range(len(plane_vehicle.units)):
-        arm, side = plane_vehicle.reach[chain_point.unit, j], 0.0
+        arm, side = plane_vehicle.arm_lengths[chain_point.unit, j], 0.0
         if j == chain_point.unit:
             arm, side = arm + chain_point.x, chain_point.y
         cosine_between, aslant = (

@@ -103,20 +103,22 @@ def wheels_of(rows):
 class StepWorkspace(NamedTuple):
     """Arrays shared by all iterations within a time step.
 
-    along, across, press (W, n) : see ``plane_chain.fill_velocity_rows``, and load by accelerations; units (U, 2) : see
-    ``fill_headings``; mass (n, n) : the factor of the mass matrix; right (n,) : forces besides the tyres' forces; out,
-    out_before, off (n,) : accelerations from the last iteration, from the one before, and the residual of the latter.
+    rows_along, rows_across, load_rows (W, n) : see ``plane_chain.fill_velocity_rows``, and load by accelerations;
+    heading_vectors (U, 2) : see ``fill_headings``; mass_matrix (n, n) : the factor of the mass matrix; right_side (n,)
+    : forces besides the tyres' forces; out,
+    response_before, residual_before (n,) : accelerations from the last iteration, from the one before, and the residual
+    of the latter.
     """
 
     wheels: WheelStates
     surfaces: WheelSurfaces
     report: WheelReport
-    along: np.ndarray
-    across: np.ndarray
-    press: np.ndarray
-    units: np.ndarray
-    mass: np.ndarray
-    right: np.ndarray
-    out: np.ndarray
-    out_before: np.ndarray
-    off: np.ndarray
+    rows_along: np.ndarray
+    rows_across: np.ndarray
+    load_rows: np.ndarray
+    heading_vectors: np.ndarray
+    mass_matrix: np.ndarray
+    right_side: np.ndarray
+    response: np.ndarray
+    response_before: np.ndarray
+    residual_before: np.ndarray

@@ -64,20 +64,27 @@ def fill_state_quantities(vehicle_motion, steer_angles, regularising_speed, at_s
     """Fill wheel quantities and equations of motion that follow from the state. With ``at_step_start``, the state is
     that at the start of the step, and the wheels' steer angles and speeds along them are stored.
     """
-    plane, angles, wheels, units = vehicle.plane, vehicle.tables.angles, workspace.wheels, workspace.units
+    plane, angles, wheels, units = vehicle.plane, vehicle.tables.angles, workspace.wheels, workspace.heading_vectors
     positions, rates, still = vehicle_motion.state[0], vehicle_motion.state[1], workspace.wheels.static_load
     fill_headings(positions, units)
     for i in range(plane.unit.size):
-        row_along, row_across, g, k = workspace.along[i], workspace.across[i], plane.group[i], plane.unit[i]
-        still[i] = plane.static[i]
-        if plane.by_x[i] != 0.0 or plane.by_y[i] != 0.0:
+        row_along, row_across, g, k = (
+            workspace.rows_along[i],
+            workspace.rows_across[i],
+            plane.load_unit[i],
+            plane.unit[i],
+        )
+        still[i] = plane.static_loads[i]
+        if plane.load_per_x_acceleration[i] != 0.0 or plane.load_per_y_acceleration[i] != 0.0:
             heading = Direction(units[g, 0], units[g, 1])
             bias_along, bias_across = fill_velocity_rows(
                 ChainPoint(g, 0.0, 0.0), heading, units, rates, plane, row_along, row_across
             )
             for a in range(count_of_coordinates(plane)):
-                workspace.press[i, a] = plane.by_x[i] * row_along[a] + plane.by_y[i] * row_across[a]
-            still[i] += plane.by_x[i] * bias_along + plane.by_y[i] * bias_across
+                workspace.load_rows[i, a] = (
+                    plane.load_per_x_acceleration[i] * row_along[a] + plane.load_per_y_acceleration[i] * row_across[a]
+                )
+            still[i] += plane.load_per_x_acceleration[i] * bias_along + plane.load_per_y_acceleration[i] * bias_across
         if at_step_start:
             same_steer = i > 0 and steer_angles[i] == steer_angles[i - 1]
             wheels.cosine[i] = wheels.cosine[i - 1] if same_steer else math.cos(steer_angles[i])
@@ -91,17 +98,19 @@ def fill_state_quantities(vehicle_motion, steer_angles, regularising_speed, at_s
             wheels.start[i] = u
         wheels.rate[i] = bias_along + v * rates[2 + k]
         set_slip_angle(i, u, v, regularising_speed, workspace.surfaces.lag, angles, wheels)
-    fill_mass_matrix(units, rates, plane, workspace.mass, workspace.right, workspace.out, workspace.out_before)
+    fill_mass_matrix(
+        units, rates, plane, workspace.mass_matrix, workspace.right_side, workspace.response, workspace.response_before
+    )
     for a in range(count_of_prescribed(plane), count_of_coordinates(plane)):
         for b in range(count_of_prescribed(plane)):
-            workspace.right[a] -= workspace.mass[a, b] * vehicle_motion.accelerations[b]
-    factorise_mass(workspace.mass, plane)
+            workspace.right_side[a] -= workspace.mass_matrix[a, b] * vehicle_motion.accelerations[b]
+    factorise_mass(workspace.mass_matrix, plane)
 
 
 @inlined
 def set_slip_angle(wheel_index, speed_along, speed_across, regularising_speed, lagging_slips, table_angles, wheels):
-    """Set the slip angle of wheel i from the speeds (m/s) of its centre along it, u, and of its tyre across it, v.
-    Where ``lagging_slips`` (W,) of ``Surfaces`` is a number, it gives the slip angle in place of v.
+    """Set the slip angle of wheel i from the speeds (m/s) of its centre along it and of its tyre across it.
+    Where ``lagging_slips`` (W,) of ``WheelSurfaces`` is a number, it gives the slip angle in place of v.
     """
     i = wheel_index
     forwards = speed_along if wheels.start[i] >= 0.0 else -speed_along
@@ -146,20 +155,16 @@ def fill_tyre_report(wheel_index, step_input, wheel, tyre_tables, wheels, surfac
 
 
 @lean
-def redistribute_negative_loads(wheel_loads, wheel_positions):
+def redistribute_negative_loads(wheel_loads, positions):
     """Correct loads (W,) in N of two-axle vehicles in place where a wheel's load is negative: the wheel gets none, and
-    the other wheels keep the static equilibrium. wheel_positions (W, 2) : positions of the wheels in their units' axes,
-    m.
+    the other wheels keep the static equilibrium. positions (W, 2) : of the wheels in their units' axes, m.
 
     The other wheel of its axle bears the axle's load, and the other axle what this one cannot take of the roll moment.
     An axle that would lift leaves all its load to the other one. Beyond balance, both wheels of a side bear none.
     """
     for first in range(0, wheel_loads.size - 3, 4):
         front, rear = wheel_loads[first : first + 2], wheel_loads[first + 2 : first + 4]
-        width, behind = (
-            wheel_positions[first, 1] - wheel_positions[first + 1, 1],
-            wheel_positions[first + 2, 1] - wheel_positions[first + 3, 1],
-        )
+        width, behind = positions[first, 1] - positions[first + 1, 1], positions[first + 2, 1] - positions[first + 3, 1]
         front_load, back, front_difference, moved_back = (
             front[0] + front[1],
             rear[0] + rear[1],
@@ -182,9 +187,9 @@ def redistribute_negative_loads(wheel_loads, wheel_positions):
 
 @lean
 def fill_response(vehicle_motion, torques_before, torques_after, time_step, vehicle, workspace):
-    """Fill ``frame.out`` with the accelerations that the tyres' forces cause when the vehicle has the accelerations of
-    ``vehicle_motion``. A step's solution is a fixed point of this map. torques_before, torques_after (W,) : brake
-    torques (N m) at the ends of the step.
+    """Fill ``frame.response`` with the accelerations that the tyres' forces cause when the vehicle has the
+    accelerations of ``vehicle_motion``. A step's solution is a fixed point of this map. torques_before, torques_after
+    (W,) : brake torques (N m) at the ends of the step.
     """
     plane, tables, wheels, surfaces, report = (
         vehicle.plane,
@@ -195,28 +200,28 @@ def fill_response(vehicle_motion, torques_before, torques_after, time_step, vehi
     )
     accelerations, response, rows_along, rows_across, right = (
         vehicle_motion.accelerations,
-        workspace.out,
-        workspace.along,
-        workspace.across,
-        workspace.right,
+        workspace.response,
+        workspace.rows_along,
+        workspace.rows_across,
+        workspace.right_side,
     )
     load, still, rate, start = wheels.load, wheels.static_load, wheels.rate, wheels.start
     size, free, lifts = count_of_coordinates(plane), count_of_prescribed(plane), False
     for a in range(size):
         response[a] = accelerations[a] if a < free else right[a]
     for i in range(load.size):
-        load[i] = still[i] + scalar_product(workspace.press[i], accelerations)
+        load[i] = still[i] + scalar_product(workspace.load_rows[i], accelerations)
         lifts = lifts or load[i] < 0.0
     if lifts:
         redistribute_negative_loads(load, plane.place)
     for i in range(load.size):
         speed1 = start[i] + time_step * (rate[i] + scalar_product(rows_along[i], accelerations))
         step_input = WheelStepInput(start[i], speed1, torques_before[i], torques_after[i], time_step)
-        wheel = BrakedWheel(plane.radius[i], plane.spin[i], vehicle_motion.turning[i])
+        wheel = BrakedWheel(plane.radius[i], plane.spin_inertia[i], vehicle_motion.turning[i])
         fill_tyre_report(i, step_input, wheel, tables, wheels, surfaces, report)
         for a in range(free, size):
             response[a] += rows_along[i, a] * report.force_x[i] + rows_across[i, a] * report.force_y[i]
-    solve_accelerations(workspace.mass, plane, response)
+    solve_accelerations(workspace.mass_matrix, plane, response)
 
 
 @inlined
@@ -230,9 +235,9 @@ def find_accelerations(vehicle_motion, torques_before, torques_after, time_step,
     """
     accelerations, response, out0, off0 = (
         vehicle_motion.accelerations,
-        workspace.out,
-        workspace.out_before,
-        workspace.off,
+        workspace.response,
+        workspace.response_before,
+        workspace.residual_before,
     )
     size, remaining_error, last_change = count_of_coordinates(vehicle.plane), math.inf, 0.0
     for rounds in range(round_limit):
@@ -272,7 +277,7 @@ def find_mean_accelerations(vehicle_motion, torques_before, torques_after, time_
     Source: A. F. Filippov, Differential equations with discontinuous righthand sides (1988); W. R. Mann, Proc. AMS 4
     (1953) 506-510; recalled, not checked.
     """
-    accelerations, response, report = vehicle_motion.accelerations, workspace.out, vehicle_motion.report
+    accelerations, response, report = vehicle_motion.accelerations, workspace.response, vehicle_motion.report
     size, share, last_change = count_of_coordinates(vehicle.plane), 0.5, math.inf
     means = array(doubles(report.size), report.shape)
     start_accelerations = array(doubles(accelerations.size), accelerations.shape)
@@ -333,7 +338,7 @@ def time_of_rest(coordinate_rates, wheel_turning, accelerations, time_step, plan
 
 @lean
 def advance_one_step(vehicle_motion, brake_torques, time_step, steer_angles, regularising_speed, vehicle, surfaces):
-    """Advance a ``PlaneMotion`` whose wheels are on ``Surfaces`` by one step (s).
+    """Advance a ``PlaneMotion`` whose wheels are on ``WheelSurfaces`` by one step (s).
 
     brake_torques (2, W) : of the brakes at the step's ends; steer_angles (W,) : angles of the wheels in their units
     (rad);
@@ -363,7 +368,7 @@ def advance_one_step(vehicle_motion, brake_torques, time_step, steer_angles, reg
         plane_rows[2],
         plane_rows[3],
     )
-    frame.press[:] = 0.0
+    frame.load_rows[:] = 0.0
     place0, rate0 = plane_rows[4], plane_rows[5]
     for a in range(size):
         place0[a], rate0[a] = state[0, a], state[1, a]

@@ -45,25 +45,27 @@ class Truck(Strict):
 class PlaneVehicle(NamedTuple):
     """Parameters of a vehicle in the plane, of U units and W wheels, for compiled functions.
 
-    masses, inertias (U,); reach (U, U): see ``plane_chain``; unit, group (W,): of each wheel, the group being the unit
-    whose acceleration moves its load; place (W, 2): m, in its unit's axes; radius, spin (W,): m, kg m^2;
-    static (W,): N; by_x, by_y (W,): change of load by the group's acceleration, N s^2/m; has_prescribed_hook: 1 if the
-    first two coordinates are prescribed; jackknife_angle: rad, angle of a hinge beyond which a train jackknifes; units
+    masses, inertias (U,); arm_lengths (U, U): see ``plane_chain``; unit, load_unit (W,): of each wheel, the group being
+    the unit whose acceleration moves its load; place (W, 2): m, in its unit's axes; radius, spin_inertia (W,): m, kg
+    m^2;
+    static_loads (W,): N; load_per_x_acceleration, load_per_y_acceleration (W,): change of load by the group's
+    acceleration, N s^2/m; has_prescribed_hook: 1 if the first two coordinates are prescribed; jackknife_angle: rad,
+    angle of a hinge beyond which a train jackknifes; units
     (U,): their numbers, of one alone as a tuple, whose size compiled functions know beforehand, so that none of them
     counts units where there is no trailer.
     """
 
     masses: np.ndarray
     inertias: np.ndarray
-    reach: np.ndarray
+    arm_lengths: np.ndarray
     unit: np.ndarray
-    group: np.ndarray
+    load_unit: np.ndarray
     place: np.ndarray
     radius: np.ndarray
-    spin: np.ndarray
-    static: np.ndarray
-    by_x: np.ndarray
-    by_y: np.ndarray
+    spin_inertia: np.ndarray
+    static_loads: np.ndarray
+    load_per_x_acceleration: np.ndarray
+    load_per_y_acceleration: np.ndarray
     has_prescribed_hook: int
     jackknife_angle: float = math.inf
     units: np.ndarray | tuple[int] = (0,)

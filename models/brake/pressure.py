@@ -46,7 +46,7 @@ class AirState(NamedTuple):
     """
 
     pressure: np.ndarray
-    brake_torque: np.ndarray
+    torque: np.ndarray
     supply: np.ndarray
     commands: np.ndarray
 

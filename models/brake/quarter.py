@@ -17,7 +17,7 @@ from models.brake.surfaces import RoadSurfaces, VehicleOnRoad, fill_surfaces_und
 from models.core.errors import InputError, RunFailed
 from models.core.strict import Strict, quantity
 from models.machine.compiled import njit
-from models.tyre.tyre_table import Tables
+from models.tyre.tyre_table import StackedTyreTables
 
 LEAST_SLIP_ANGLE_SPEED = 0.1
 """Speed (m/s) that replaces lower speeds in slip angles; without lateral motion they are zero."""
@@ -124,7 +124,7 @@ def march_quarter_vehicle(wheel_motion, brake_torques, time_step, vehicle, quart
 
 def stop_of_quarter_vehicle(
     quarter_vehicle: QuarterVehicle,
-    tyre_tables: Tables,
+    tyre_tables: StackedTyreTables,
     road: RoadSurfaces,
     brake_torques: np.ndarray,
     time_step: float,

@@ -42,7 +42,7 @@ class TyreLag(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def lagging_slip(slip_tangent, speed_along, speed_across, duration, relaxation_length):
-    """Tangent of the lagging slip angle after a time (s) at constant speeds u along and v across the wheel (m/s), with
+    """Tangent of the lagging slip angle after a time (s) at constant speeds along and across the wheel (m/s), with
     a relaxation length (m).
     """
     return (
@@ -58,8 +58,8 @@ def lagging_slip(slip_tangent, speed_along, speed_across, duration, relaxation_l
 def advance_lagging_slip(
     wheel_index, speed_along, speed_across, duration, cornering_coefficient, tyre_lag, slip_tangents
 ):
-    """Advance the lagging slip angle of wheel i by a time (s) at speeds u along and v across it (m/s). Its tangent with
-    the damper's part goes into ``slip_tangents`` (W,); cornering_coefficient : see ``OnRoad``.
+    """Advance the lagging slip angle of wheel i by a time (s) at speeds along and across it (m/s). Its tangent with
+    the damper's part goes into ``slip_tangents`` (W,); cornering_coefficient : see ``VehicleOnRoad``.
 
     An angle that is NaN starts at its steady value for these speeds.
     """
@@ -97,7 +97,7 @@ def advance_all_lagging_slips(vehicle_state, duration, steer_angles, vehicle, ty
     for i in range(tyre_lag.angle.size):
         k = plane.unit[i]
         vx, vy = chain_point_velocity(
-            ChainPoint(k, plane.place[i, 0], plane.place[i, 1]), vehicle_state[0], vehicle_state[1], plane.reach
+            ChainPoint(k, plane.place[i, 0], plane.place[i, 1]), vehicle_state[0], vehicle_state[1], plane.arm_lengths
         )
         c, s = math.cos(vehicle_state[0, 2 + k] + steer_angles[i]), math.sin(vehicle_state[0, 2 + k] + steer_angles[i])
         advance_lagging_slip(i, c * vx + s * vy, c * vy - s * vx, duration, vehicle.slope, tyre_lag, slip_tangents)

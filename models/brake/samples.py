@@ -30,7 +30,7 @@ class RecordedRow(NamedTuple):
     see ``PlaneMotion``.
     """
 
-    whole: np.ndarray
+    all_values: np.ndarray
     time: np.ndarray
     state: np.ndarray
     turning: np.ndarray
@@ -73,7 +73,7 @@ class BrakeCommands(NamedTuple):
     (W,) in bar, of which the first is NaN where valve states apply instead, and steer angles (W,) in rad.
     """
 
-    sample_generator: np.ndarray
+    samples: np.ndarray
     valves: np.ndarray
     pressures: np.ndarray
     steer: np.ndarray
@@ -81,14 +81,14 @@ class BrakeCommands(NamedTuple):
 
 class SampleRecord(NamedTuple):
     """Record of the samples: now (k,), the present state as numbers of which the first is the time (s); rows (m, k),
-    states at earlier samples, of which the first ``left`` (1,) are filled and not yet collected; until (s): the run
-    ends with the first sample that ends then or later.
+    states at earlier samples, of which the first ``uncollected_count`` (1,) are filled and not yet collected; end_time
+    (s): the run ends with the first sample that ends then or later.
     """
 
-    now: np.ndarray
+    present_row: np.ndarray
     rows: np.ndarray
-    left: np.ndarray
-    until: float
+    uncollected_count: np.ndarray
+    end_time: float
 
 
 class BrakeSystem(NamedTuple):
@@ -101,16 +101,16 @@ class BrakeSystem(NamedTuple):
 
 
 class BrakingRun(NamedTuple):
-    """All data of a braking run that its samples need; sample : duration (s); others: further arguments of ``advance``,
-    after the steer angles.
+    """All data of a braking run that its samples need; sampling_period : duration (s); vehicle_parts: further arguments
+    of ``advance``, after the steer angles.
     """
 
     commands: BrakeCommands
     record: SampleRecord
-    sample: float
+    sampling_period: float
     braking: BrakeSystem
-    motion: PlaneMotion
-    others: tuple[Any, ...]
+    vehicle_motion: PlaneMotion
+    vehicle_parts: tuple[Any, ...]
 
 
 @structref.register
@@ -150,10 +150,10 @@ def advance_some_samples(commands, record, sampling_period, braking, vehicle_mot
         simulated_time += used
         if status not in (FINE, AT_REST):
             break
-        record.now[0] = simulated_time
-        copy_row(record.now, record.rows[record.left[0]])
-        record.left[0] += 1
-        if status == AT_REST or simulated_time >= record.until:
+        record.present_row[0] = simulated_time
+        copy_row(record.present_row, record.rows[record.uncollected_count[0]])
+        record.uncollected_count[0] += 1
+        if status == AT_REST or simulated_time >= record.end_time:
             break
     return status, simulated_time
 
@@ -170,16 +170,16 @@ def sample_generator(braking_run):
     """
     status, simulated_time = FINE, 0.0
     while True:
-        rates = braking_run.motion.state[1]
+        rates = braking_run.vehicle_motion.state[1]
         yield status, simulated_time, math.hypot(rates[0], rates[1]), braking_run.braking.air.supply[0]
         status, simulated_time = some(
             braking_run.commands,
             braking_run.record,
-            braking_run.sample,
+            braking_run.sampling_period,
             braking_run.braking,
-            braking_run.motion,
+            braking_run.vehicle_motion,
             simulated_time,
-            braking_run.others,
+            braking_run.vehicle_parts,
         )
 
 

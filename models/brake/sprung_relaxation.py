@@ -14,7 +14,7 @@ from models.machine.compiled import lean
 
 
 class ContactLag(NamedTuple):
-    """Tyres with lagging slip angles, as ``Lag``: length and angle (W,), and behind (1,): the time (s) by which the
+    """Tyres with lagging slip angles, as ``TyreLag``: length and angle (W,), and behind (1,): the time (s) by which the
     angles lie behind the motion.
     """
 
@@ -26,7 +26,7 @@ class ContactLag(NamedTuple):
 @lean
 def advance_contact_lag(wheel_contacts, half_step, cornering_coefficient, contact_lag, surfaces):
     """Advance a ``ContactLag`` to half a step (s) after the motion in ``Contacts``; put its slip angles into the
-    ``Surfaces``.
+    ``WheelSurfaces``.
     """
     time = contact_lag.behind[0] + half_step
     for i in range(contact_lag.angle.size):

@@ -190,7 +190,7 @@ def store_mean_forces(at_wheels, torques_before, torques_after, time_step, vehic
         report_of(vehicle_motion.report),
     )
     for i in range(torques_before.size):
-        speed, wheel = wheels.start[i], BrakedWheel(plane.radius[i], plane.spin[i], vehicle_motion.turning[i])
+        speed, wheel = wheels.start[i], BrakedWheel(plane.radius[i], plane.spin_inertia[i], vehicle_motion.turning[i])
         step_input = WheelStepInput(
             speed, speed + time_step * wheels.rate[i], torques_before[i], torques_after[i], time_step
         )
@@ -249,18 +249,18 @@ def status_at_end(q, train_units, jackknife_angle):
 class SprungStepData(NamedTuple):
     """Data that a step of a vehicle on its suspension needs in addition to the data of a plane step.
 
-    numbers : the table, at whose end is what the wheels hold; contacts : of the state whose ``add_vehicle_forces`` (n,)
-    were taken;
-    middle (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see
+    force_table : the table, at whose end is what the wheels hold; contacts : of the state whose ``add_vehicle_forces``
+    (n,) were taken;
+    middle_state (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see
     ``EngineSprungVehicle``; engine : its model; units : ``TrainUnits``; lag : of ``models.brake.sprung_relaxation``,
     empty where tyres answer at once.
     """
 
-    numbers: np.ndarray
-    known: WheelData
+    force_table: np.ndarray
+    wheel_data: WheelData
     contacts: WheelContacts
-    add_vehicle_forces: np.ndarray
-    middle: np.ndarray
+    forces: np.ndarray
+    middle_state: np.ndarray
     rates: np.ndarray
     liveliness: float
     engine: Any
@@ -296,7 +296,12 @@ def advance(vehicle_motion, brake_torques, time_step, steer_angles, vehicle, eng
     A run begins with accelerations of zero. The engine's step is ``time_step``. At its start the speeds along the
     wheels are taken to change as they did in the last one.
     """
-    angles, known, contacts, middle = vehicle.tables.angles, engine_run.known, engine_run.contacts, engine_run.middle
+    angles, known, contacts, middle = (
+        vehicle.tables.angles,
+        engine_run.wheel_data,
+        engine_run.contacts,
+        engine_run.middle_state,
+    )
     wheels, units = known.wheels, engine_run.units
     q, v, turning, accelerations = (
         vehicle_motion.state[0],
@@ -315,7 +320,7 @@ def advance(vehicle_motion, brake_torques, time_step, steer_angles, vehicle, eng
         fill_unit_values(v, turns, plane[1])
         fill_surfaces_under_wheels(plane, time_step, vehicle, known.surfaces)
         engine_run.forces[:] = 0.0
-        forces_and_contacts(engine_run.numbers, q, v, engine_run.forces, contacts)
+        forces_and_contacts(engine_run.force_table, q, v, engine_run.forces, contacts)
         wheels.start[:] = contacts.along
         relax(contacts, half, vehicle.slope, engine_run.lag, known.surfaces)
         set_slip_angles(contacts, regular, known.surfaces.lag, angles, wheels)
@@ -333,7 +338,7 @@ def advance(vehicle_motion, brake_torques, time_step, steer_angles, vehicle, eng
         else:
             middle[0], middle[1] = q + half * v + 0.5 * half**2 * rates, v + half * rates
             engine_run.forces[:] = 0.0
-            forces_and_contacts(engine_run.numbers, middle[0], middle[1], engine_run.forces, contacts)
+            forces_and_contacts(engine_run.force_table, middle[0], middle[1], engine_run.forces, contacts)
             wheels.rate[:] = (contacts.along - wheels.start) / half
             set_slip_angles(contacts, regular, known.surfaces.lag, angles, wheels)
             store_mean_forces(known, torques_before, torques_after, time_step, vehicle_motion, vehicle)

@@ -10,7 +10,7 @@ from models.brake.plane_chain import ChainPoint, chain_point_position, chain_poi
 from models.brake.plane_vehicle import PlaneVehicle
 from models.core.errors import InputError
 from models.machine.compiled import inlined, lean
-from models.tyre.tyre_table import Tables
+from models.tyre.tyre_table import StackedTyreTables
 
 
 class RoadSurfaces(NamedTuple):
@@ -37,8 +37,8 @@ class VehicleOnRoad(NamedTuple):
     plane: PlaneVehicle
     kind: np.ndarray
     slope: float
-    tables: Tables
-    road_of_stretches: RoadSurfaces
+    tables: StackedTyreTables
+    road: RoadSurfaces
 
 
 class WheelSurfaces(NamedTuple):
@@ -134,8 +134,8 @@ def fill_surfaces_under_wheels(vehicle_state, time_step, vehicle_on_road, wheel_
         return
     for i in range(plane.unit.size):
         centre = ChainPoint(plane.unit[i], plane.place[i, 0], plane.place[i, 1])
-        px, py = chain_point_position(centre, vehicle_state[0], plane.reach)
-        vx, vy = chain_point_velocity(centre, vehicle_state[0], vehicle_state[1], plane.reach)
+        px, py = chain_point_position(centre, vehicle_state[0], plane.arm_lengths)
+        vx, vy = chain_point_velocity(centre, vehicle_state[0], vehicle_state[1], plane.arm_lengths)
         low, high = min(px, px + time_step * vx), max(px, px + time_step * vx)
         right, left = min(py, py + time_step * vy), max(py, py + time_step * vy)
         first_stretch = max(np.searchsorted(road.starts, low, side="right") - 1, 0)

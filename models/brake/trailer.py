@@ -28,7 +28,7 @@ from models.brake.surfaces import UNIFORM_ROAD, VehicleOnRoad, fill_surfaces_und
 from models.core.errors import InputError
 from models.core.strict import quantity
 from models.machine.compiled import njit
-from models.tyre.tyre_table import Tables
+from models.tyre.tyre_table import StackedTyreTables
 
 
 class Trailer(Truck):
@@ -104,7 +104,7 @@ class HookPull(NamedTuple):
 
 def trailer_behind_hook(
     plane_trailer: PlaneVehicle,
-    tyre_tables: Tables,
+    tyre_tables: StackedTyreTables,
     start_state: np.ndarray,
     hook_velocities: np.ndarray,
     time_step: float,

@@ -40,7 +40,7 @@ class TyreGrip(NamedTuple):
     """Longitudinal tyre force as a function of slip, at a constant slip angle and load.
 
     first, second : its two tables; share : of the second; cells : of the slip angle and the load in both; load : N;
-    slips (s,), mu_x (t, a, f, s) : see ``models.tyre.tyre_table.Tables``.
+    slips (s,), mu_x (t, a, f, s) : see ``models.tyre.tyre_table.StackedTyreTables``.
     """
 
     first: int

@@ -18,7 +18,7 @@ from models.machine.compiled import compiled
 @compiled
 def fill_forces_with_falling_friction(contacts, grid_strips, strip_cells, flexibility_kind, friction_law, forces_out):
     """Fill FASTSIM's forces of many contacts, FORCES (n,), by the second-order march with falling friction;
-    friction_law : of ``Falling``.
+    friction_law : of ``FallingFriction``.
     """
     n, area, slip = strip_cells.centre.size, 0.0, np.empty(1, SLIP)[0]
     friction_shares, tractions = np.empty((2, n)), np.empty((3, n))

@@ -30,7 +30,9 @@ beginning. With those below, calibrated on 910 contacts of the exact theory, 250
 spin, and compared with others (validation case ``contact_price``).
 """
 SPIN_BY_RATIO, REACH_BY_RATIO, RATIOS = 0.6, 0.45, (0.1, 10.0)
-"""Further constants of the blend: powers of a/b, within ``RATIOS``, in the weight of spin and in the reach."""
+"""Further constants of the blend: powers of a/b, within ``RATIOS``, in the weight of spin and in the
+reach.
+"""
 SLIDING_SQUARE, LARGEST_BLEND_EXPONENT = 8.0, 100.0
 """Square of the ratio of the linear theory's traction to the bound at which creepage without spin makes the whole area
 slide, and exponent beyond which nothing changes.

@@ -35,7 +35,7 @@ class ContactPointer:
     """
 
     address: int
-    grid_table: Array
+    net: Array
     call: Any
 
     @property

@@ -3,8 +3,9 @@ approach.
 
 The undeformed distance and the way the theory is used are a table of doubles that ``distance_table`` makes. The kernel
 finds the depth that has the approach, marches, fits W_1 = W_2 and marches again, by the compiled parts of the package:
-its numbers are those of ``press`` and ``roll``. Nothing is raised. The work arrays, some ten kilobytes, are taken from
-the heap and given back within the call, which is a hundredth of its time; no lock, nothing kept, any number of threads.
+its numbers are those of ``solve_normal_contact`` and ``solve_rolling_contact``. Nothing is raised. The work arrays,
+some ten kilobytes, are taken from the heap and given back within the call, which is a hundredth of its time; no lock,
+nothing kept, any number of threads.
 """
 
 import math
@@ -226,7 +227,7 @@ def _fill_rolling_forces(input_record, table_pointer, depth, stiffness, output_r
 
 @compiled
 def scale_pressure_to_load(fine_net, load):
-    """Scale the pressure of a ``FineNet`` to carry the load (N), so that full sliding gives mu N exactly."""
+    """Scale the pressure of a ``FineGrid`` to carry the load (N), so that full sliding gives mu N exactly."""
     carried, (strips_, cells) = 0.0, fine_net.pressure.shape
     for s in range(strips_):
         for i in range(cells):

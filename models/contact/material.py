@@ -103,7 +103,8 @@ class MaterialPair:
 
 
 class FallingFriction(Strict):
-    """[falling_friction]: ``Falling(floor=0.4, decay=0.6, speed=20.0)``, friction that falls with the speed of slip.
+    """[falling_friction]: ``FallingFriction(floor=0.4, decay=0.6, speed=20.0)``, friction that falls with the speed of
+    slip.
 
     mu(s) = mu (floor + (1 - floor) exp(-decay s)), s in m/s: Polach's law (Wear 258 (2005) 992), taken point by point.
     ``fastsim_falling`` computes with it, and is not imported where friction is constant.

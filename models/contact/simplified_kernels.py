@@ -62,15 +62,11 @@ def cell_sizes(rectangle, cell_count):
 
 @compiled
 def coarse_cells(surface, cell_count, pressure_shape):
-    """Height, W p and covered share of every cell of the coarse grid (cells, cells), rows along y.
-
-    The share of a mesh that the contact covers, for a straight edge: it makes meshes enter and leave without a jump.
+    """Height, W p and covered share of every cell of the coarse grid (cells, cells), rows along y. The share of a mesh
+    that the contact covers, for a straight edge: it makes meshes enter and leave without a jump.
     """
-    height, pressure, cover = (
-        np.empty((cell_count, cell_count)),
-        np.empty((cell_count, cell_count)),
-        np.empty((cell_count, cell_count)),
-    )
+    shape = cell_count, cell_count
+    height, pressure, cover = np.empty(shape), np.empty(shape), np.empty(shape)
     padded, origin, step, box, depth, _ = surface
     dx, dy = cell_sizes(box, cell_count)
     for j in range(cell_count):
@@ -147,9 +143,7 @@ def covariances(displacements, heights, covered_shares):
 
 @compiled
 def weighted_mean(cell_values, cell_weights):
-    """Weighted mean of ``cell_values``; weights of the same shape. Loops compile ten times as fast as array
-    expressions.
-    """
+    """Weighted mean of values of any shape. Loops compile ten times as fast as array expressions."""
     total = weight = 0.0
     for k in range(cell_values.size):
         total += cell_weights.flat[k] * cell_values.flat[k]
@@ -158,18 +152,15 @@ def weighted_mean(cell_values, cell_weights):
 
 
 @compiled
-def slope_products(displacements, heights, covered_shares, dx, dy, along_y):
+def slope_products(u, h, covered_shares, dx, dy, along_y):
     """Weighted sums over neighbouring cells: products of the slopes of u and h, and squares of the slopes of u."""
     product = square = 0.0
     for down in range(2 if along_y else 1):
         right, step = 1 - down, dy if down else dx
-        for j in range(displacements.shape[0] - down):
-            for i in range(displacements.shape[1] - right):
+        for j in range(u.shape[0] - down):
+            for i in range(u.shape[1] - right):
                 w = covered_shares[j, i] * covered_shares[j + down, i + right]
-                du, dh = (
-                    (displacements[j + down, i + right] - displacements[j, i]) / step,
-                    (heights[j + down, i + right] - heights[j, i]) / step,
-                )
+                du, dh = (u[j + down, i + right] - u[j, i]) / step, (h[j + down, i + right] - h[j, i]) / step
                 product += w * du * dh
                 square += w * du * du
     return product, square
@@ -312,25 +303,22 @@ def fine_strips(surface, line_count, cell_count, pressure_shape):
 
 
 @compiled
-def depth_crossing(height_row, depth, inner_position, outer_position):
+def depth_crossing(height_row, depth, inner, outer):
     """Position where the row's height equals the depth, between points below and not below it (false position, Illinois
     rule)."""
-    at_inner, at_outer = (
-        value_along_row(height_row, inner_position) - depth,
-        value_along_row(height_row, outer_position) - depth,
-    )
-    middle, kept = outer_position, 0
+    at_inner, at_outer = value_along_row(height_row, inner) - depth, value_along_row(height_row, outer) - depth
+    middle, kept = outer, 0
     for _ in range(30):
-        middle = inner_position - at_inner * (outer_position - inner_position) / (at_outer - at_inner)
+        middle = inner - at_inner * (outer - inner) / (at_outer - at_inner)
         height = value_along_row(height_row, middle) - depth
-        if abs(height) < 1e-13 * (at_outer - at_inner) or abs(outer_position - inner_position) < 1e-12:
+        if abs(height) < 1e-13 * (at_outer - at_inner) or abs(outer - inner) < 1e-12:
             break
         if height < 0.0:
-            inner_position, at_inner = middle, height
+            inner, at_inner = middle, height
             at_outer *= 0.5 if kept < 0 else 1.0
             kept = -1
         else:
-            outer_position, at_outer = middle, height
+            outer, at_outer = middle, height
             at_inner *= 0.5 if kept > 0 else 1.0
             kept = 1
     return middle
@@ -368,22 +356,19 @@ def march_strips(fine_net, mu, flexibility, creepages, traction):
 
 
 @compiled
-def traction_after_step(traction_x, traction_y, slip_x, slip_y, traction_bound, middle_bound, is_slipping):
-    """Traction after a step, and whether it slips; without slip the rigid slip would subtract (u, v) from the traction.
+def traction_after_step(px, py, slip_x, slip_y, traction_bound, middle_bound, is_slipping):
+    """Traction after a step, and whether it slips; a cell that sticks loses the rigid slip from its traction.
 
-    A traction that continues to slip stays on the bound and turns towards -(u, v): with psi between the two, tan(psi/2)
-    shrinks by exp(-|(u, v)| / middle), where ``middle_bound`` is the bound in the middle of the step.
+    A traction that continues to slip stays on the bound and turns against the slip: with psi between the two,
+    tan(psi/2) shrinks by exp(-|slip| / middle_bound), where ``middle_bound`` is the bound in the middle of the step.
     """
-    x, y = traction_x - slip_x, traction_y - slip_y
+    x, y = px - slip_x, py - slip_y
     size = math.hypot(x, y)
     if size <= traction_bound:
         return x, y, False
-    slip, before = math.hypot(slip_x, slip_y), math.hypot(traction_x, traction_y)
+    slip, before = math.hypot(slip_x, slip_y), math.hypot(px, py)
     if is_slipping and slip > 0.0 and before > 0.0 and middle_bound > 0.0:
-        cosine, sine = (
-            -(traction_x * slip_x + traction_y * slip_y) / (before * slip),
-            (traction_x * slip_y - traction_y * slip_x) / (before * slip),
-        )
+        cosine, sine = -(px * slip_x + py * slip_y) / (before * slip), (px * slip_y - py * slip_x) / (before * slip)
         shrunk = math.exp(-slip / middle_bound)
         over, aside = (1.0 + cosine, shrunk * sine) if cosine > 0.0 else (sine, shrunk * (1.0 - cosine))
         square = over * over + aside * aside

@@ -82,7 +82,7 @@ class SimplifiedOptions:
     net: int = COARSE_CELLS
     shape: Literal["parabolic", "elliptic"] = "elliptic"
     fit: Literal["displacement", "gradient"] = "displacement"
-    separate_patches: bool = True
+    separate: bool = True
 
     def __post_init__(self) -> None:
         checked_whole_number("net", self.net, 3, 100)

@@ -122,8 +122,8 @@ def friction_warning(force_ratios: np.ndarray) -> str:
     if not beyond.size:
         return ""
     return (
-        f"the linear theory's force is more than friction can carry at {beyond.size} of {force_ratios.size} creepages, up "
-        f"to {beyond.max():.3g} mu N: it knows no slip"
+        f"the linear theory's force is more than friction can carry at {beyond.size} of {force_ratios.size} creepages, "
+        f"up to {beyond.max():.3g} mu N: it knows no slip"
     )
 
 
@@ -195,7 +195,7 @@ class SimplifiedTheory(RollingOnPatches):
         """Creep forces, with ``cell_count`` strips and as many cells per strip in each patch; fields are placed along
         the rail's contour.
         """
-        forces = roll_simplified(self.pressed, self.friction, *creepages, cells=cell_count)
+        forces = roll_simplified(self.pressed, self.friction, *creepages, cell_count=cell_count)
         inside = self.along_contour(forces.fields)
         return RollingResult(forces.fx, forces.fy, forces.mz, forces.stick_share, forces.power, inside)
 

@@ -86,7 +86,7 @@ def bodies(plane_vehicle: PlaneVehicle) -> SpatialVehicle:
     chain = list[Body]()
     for k, (mass, turn) in enumerate(zip(plane_vehicle.masses, plane_vehicle.inertias, strict=True)):
         tensor = ((turn, 0.0, 0.0), (0.0, turn, 0.0), (0.0, 0.0, turn))
-        hinge, centre = float(plane_vehicle.reach[k, :k].sum()), float(plane_vehicle.reach[k].sum())
+        hinge, centre = float(plane_vehicle.arm_lengths[k, :k].sum()), float(plane_vehicle.arm_lengths[k].sum())
         if k == 0:
             chain.append(Body("0", float(mass), (0.0, 0.0, 0.0), ("x", "y", "rz"), tensor))
             continue
@@ -103,7 +103,7 @@ class EngineChassis:
     def __init__(self, engine: str, plane_vehicle: PlaneVehicle) -> None:
         units, none = plane_vehicle.masses.size, np.zeros((3, plane_vehicle.wheels))
         wheels = np.vstack((plane_vehicle.unit, plane_vehicle.place.T, none))
-        numbers = np.concatenate(([units, plane_vehicle.wheels], plane_vehicle.reach.ravel(), wheels.ravel()))
+        numbers = np.concatenate(([units, plane_vehicle.wheels], plane_vehicle.arm_lengths.ravel(), wheels.ravel()))
         driven = Driven(bodies(plane_vehicle), np.zeros(3), numbers, held, set_held)
         self._model: FreeModel = free_model(engine, driven)
         self._held = WheelForces(*self._model.numbers[HEADER + units * units :].reshape(HELD, plane_vehicle.wheels))
@@ -117,8 +117,9 @@ class EngineChassis:
         vehicle: VehicleOnRoad,
         *lag: Any,
     ) -> tuple[int, float]:
-        """Advance a braked vehicle as ``models.brake.advance.advance`` does (``advance_lagging`` with a ``Lag``); the
-        engine computes the motion in each step (s). Returns the status and the time (s)."""
+        """Advance a braked vehicle as ``models.brake.advance.advance`` does (``advance_lagging`` with a ``TyreLag``);
+        the engine computes the motion in each step (s). Returns the status and the time (s).
+        """
         time, report, go = 0.0, WheelReport(*motion.report), advance
         if lag:
             from models.brake.relaxation import advance_lagging as go

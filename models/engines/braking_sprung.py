@@ -216,11 +216,11 @@ class EngineSprungVehicle:
         """Accelerations (n,) of a state (2, n) in which the wheels roll without brakes, and the wheels' rotational
         speeds (W,) in rad/s."""
         on_engine, none = self._on_engine, np.zeros(steer.size)
-        known = self._at_wheels(on_engine.numbers)
+        known = self._at_wheels(on_engine.force_table)
         for part in known.wheel_forces:
             part[:] = 0.0
         known.wheel_forces.steer[:] = steer
-        forces_and_contacts(on_engine.numbers, *state, np.zeros(self.size), on_engine.contacts)
+        forces_and_contacts(on_engine.force_table, *state, np.zeros(self.size), on_engine.contacts)
         turning = on_engine.contacts.along / vehicle.plane.radius
         for whole, of_units in zip(state, on_engine.units.motion, strict=True):
             fill_unit_values(whole, on_engine.units.turns, of_units)

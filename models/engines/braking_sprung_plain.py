@@ -113,10 +113,10 @@ class PlainSprungVehicle:
                     pressures.by_pressures(commands.pressures, torques)
                 status, used = self.advance(motion, torques, step, commands.steer, vehicle, lagging)
                 time += used
-                record.now[0] = time
-                record.rows[record.left[0]] = record.now
-                record.left[0] += 1
-                if status == AT_REST or time >= record.until:
+                record.present_row[0] = time
+                record.rows[record.uncollected_count[0]] = record.present_row
+                record.uncollected_count[0] += 1
+                if status == AT_REST or time >= record.end_time:
                     break
 
     def check_step(self, step: float) -> None:

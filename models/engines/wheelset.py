@@ -14,15 +14,15 @@ from models.contact.inputs import Array
 from models.core.errors import RunFailed
 from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.native_parts import GroundSpring
-from models.rail.equations import DERAILED_LIMIT, ROLL, YAW, Equations, Y, Z
+from models.rail.equations import DERAILED_LIMIT, ROLL, YAW, WheelsetEquations, Y, Z
 from models.rail.joint_forces import (
     JOINTS,
+    joint_force_table,
     joint_forces,
     joints_from_states,
     set_joint_forces,
     state_rates,
     states_from_joints,
-    table,
 )
 from models.rail.wheelset import GRAVITY
 from models.vehicles.spatial import Body, SpatialVehicle
@@ -30,7 +30,7 @@ from models.vehicles.spatial import Body, SpatialVehicle
 CENTRE = (0.0, 0.0, 0.0)
 
 
-def driven_wheelset(wheelset_equations: Equations) -> Driven:
+def driven_wheelset(wheelset_equations: WheelsetEquations) -> Driven:
     """The wheelset as engines build it: bodies in the order of the joints, the suspension at both ends, and the table
     of numbers for the forces of the rails."""
     body = wheelset_equations.body
@@ -53,14 +53,14 @@ def driven_wheelset(wheelset_equations: Equations) -> Driven:
         )
         for arm in (body.half_spacing, -body.half_spacing)
     )
-    numbers = table(float(wheelset_equations.speed), wheelset_equations.rails)
+    numbers = joint_force_table(float(wheelset_equations.speed), wheelset_equations.rails)
     vehicle = SpatialVehicle("wheelset", bodies, (), (), ())
     return Driven(vehicle, GRAVITY * track, numbers, joint_forces, set_joint_forces, ground_springs=springs)
 
 
-class EngineWheelset(Equations):
+class EngineWheelset(WheelsetEquations):
     """A wheelset that an engine moves along the track at a constant speed; parameters and results as in
-    ``Equations``."""
+    ``WheelsetEquations``."""
 
     @cached_property
     def model(self) -> FreeModel:

@@ -10,7 +10,7 @@ from models.core.errors import InputError
 from models.multibody import forces as at
 from models.multibody import tree
 from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART, curve_numbers
-from models.tyre.bristles import cornering_stiffness_factor, net
+from models.tyre.bristles import cornering_stiffness_factor, patch_grid
 from models.vehicles.free_vehicle import CARRIER, chassis_of, free_vehicle, joints, last_coordinate_and_joint, rotor
 from models.vehicles.spatial import Curve, SpatialVehicle, Vector
 from models.vehicles.spatial_linear import Preloads, preloads, with_preloads
@@ -129,7 +129,7 @@ def table(vehicle_on_tyres: Handling) -> np.ndarray:
     free, chassis, of, points = (
         vehicle_on_tyres.vehicle,
         chassis_of(vehicle_on_tyres.given),
-        net(vehicle_on_tyres.tyres.cells),
+        patch_grid(vehicle_on_tyres.tyres.cells),
         _Points(vehicle_on_tyres.vehicle),
     )
     parts = [*_springs(vehicle_on_tyres, points), *_bars(vehicle_on_tyres, points)]

@@ -14,7 +14,7 @@ from models.machine.compiled import inlined
 RIGHT, LEFT = 1.0, -1.0
 
 
-class Cone(NamedTuple):
+class ConicalWheel(NamedTuple):
     """Geometry of a conical wheel and its rail: radius of the wheel and half the distance of both contact points in the
     middle of the track (m), tangent of the cone's half angle, radius of the rail's head (m)."""
 
@@ -28,9 +28,10 @@ class Cone(NamedTuple):
 def cone_on_rail(wheel_side, wheelset_pose, cone):
     """Contact of one conical wheel with its rail: (penetration, rolling radius, n_y, n_z, x, y, z).
 
-    wheel_side : RIGHT or LEFT; wheelset_pose : y, z of the wheelset's centre (m), roll, yaw (rad); cone : ``Cone``.
-    The normal (0, n_y, n_z) points into the rail; the place is relative to the wheelset's centre, in the track's axes
-    (m). Penetration is negative where there is a gap. Yaw and roll must be less than a right angle less the cone's.
+    wheel_side : RIGHT or LEFT; wheelset_pose : y, z of the wheelset's centre (m), roll, yaw (rad); cone :
+    ``ConicalWheel``. The normal (0, n_y, n_z) points into the rail; the place is relative to the wheelset's centre, in
+    the track's axes (m). Penetration is negative where there is a gap. Yaw and roll must be less than a right angle
+    less the cone's.
     """
     (y, z, roll, yaw), (radius, half_gauge, conicity, head) = wheelset_pose, cone
     cosine = 1.0 / math.sqrt(1.0 + conicity * conicity)

@@ -36,7 +36,7 @@ ROLL_ITERATIONS = 3
 """Count of iterations for the roll angle with the approaches of both wheels."""
 SPIN_ITERATIONS = 2
 """Count of iterations for the speed of spin with the exact loads of the patches."""
-ITERATIONS = 60
+ITERATION_COUNT = 60
 SPIN_SEARCH_SHARE = 0.05
 """Share of the nominal speed of spin within which the speed without moment about the axle is searched."""
 CELLS_PER_STRIP = 31
@@ -115,7 +115,7 @@ class WheelsetPlacement:
 
     shift: float
     yaw: float
-    solve_rolling_contact: float
+    roll: float
     spin_speed: float
     right: tuple[PatchReport, ...]
     left: tuple[PatchReport, ...]
@@ -151,14 +151,10 @@ class LoadedWheel:
             for patch_pressure in map(self.pressure_at, self.touches)
         ]
 
-    def pressure_at(self, touching_place: TouchingPlace) -> PatchPressure | None:
+    def pressure_at(self, touch: TouchingPlace) -> PatchPressure | None:
         """Pressure of the patch at a touch by the simplified theory; None if the theory finds no contact there."""
         return next(
-            (
-                patch_pressure
-                for patch_pressure in self.normal_contact.patches
-                if patch_pressure.patch is touching_place.patch
-            ),
+            (patch_pressure for patch_pressure in self.normal_contact.patches if patch_pressure.patch is touch.patch),
             None,
         )
 
@@ -203,16 +199,13 @@ class WheelsetContact:
             WheelsetPlacement(lateral_shift, yaw, pose.roll, rolling, *map(self._patch_reports, wheels))
         )
 
-    def _both_wheels(self, wheelset_pose: WheelsetPose, spin_speed: float) -> list[LoadedWheel]:
+    def _both_wheels(self, pose: WheelsetPose, spin_speed: float) -> list[LoadedWheel]:
         """The right wheel and the mirrored left wheel, each lowered until it touches its rail, then loaded.
 
         By the simplified theory, with normal forces such that they and the creep forces carry the load.
         """
         return [
-            self._wheel(
-                WheelsetPose(sign * wheelset_pose.shift, sign * wheelset_pose.yaw, sign * wheelset_pose.roll, 0.0),
-                spin_speed,
-            )
+            self._wheel(WheelsetPose(sign * pose.shift, sign * pose.yaw, sign * pose.roll, 0.0), spin_speed)
             for sign in SIDE_SIGNS
         ]
 
@@ -249,7 +242,7 @@ class WheelsetContact:
     ) -> LoadedWheel:
         """The wheel in vertical equilibrium: normal and creep forces together carry the load. ``wheel_by_normal``
         returns the wheel for a vertical part (N) of the normal forces, which is iterated from ``normal_force``."""
-        for _ in range(ITERATIONS):
+        for _ in range(ITERATION_COUNT):
             wheel = self._with_creep_forces(wheel_by_normal(normal_force))
             if abs(normal_force - wheel.creep_lift - self.load) < LOAD_PRECISION * self.load:
                 return wheel
@@ -293,51 +286,41 @@ class WheelsetContact:
         )
         return replace(loaded_wheel, forces=forces, creep_lift=lifted, moment=moment)
 
-    def _creepage(
-        self, wheelset_pose: WheelsetPose, touching_place: TouchingPlace, spin_speed: float
-    ) -> ForceOrCreepage:
+    def _creepage(self, pose: WheelsetPose, touch: TouchingPlace, spin_speed: float) -> ForceOrCreepage:
         """Longitudinal and lateral creepage, and spin (1/m), at a point of first touch."""
         if self.friction == 0.0:
             return 0.0, 0.0, 0.0
-        axle, arm = wheelset_pose.rotation[:, 1], self._arm(wheelset_pose, touching_place)
+        axle, arm = pose.rotation[:, 1], self._arm(pose, touch)
         velocity = spin_speed * np.cross(axle, arm) + np.array([self.speed, 0.0, 0.0])
-        across, into = _surface_axes(touching_place)
+        across, into = _rail_surface_axes(touch)
         slips = velocity[0] / self.speed, velocity @ across / self.speed, spin_speed * axle @ into / self.speed
         return float(slips[0]), float(slips[1]), float(slips[2])
 
-    def _radius(self, touching_place: TouchingPlace) -> float:
-        return self.side.wheelset.radius + float(self.side.wheel.curve(touching_place.wheel_y))
+    def _radius(self, touch: TouchingPlace) -> float:
+        return self.side.wheelset.radius + float(self.side.wheel.curve(touch.wheel_y))
 
-    def _arm(self, wheelset_pose: WheelsetPose, touching_place: TouchingPlace) -> Array:
+    def _arm(self, pose: WheelsetPose, touch: TouchingPlace) -> Array:
         """Vector from the wheelset's centre to a point of first touch, in the track's axes (m)."""
-        height_below = math.sqrt(self._radius(touching_place) ** 2 - touching_place.x**2)
-        return wheelset_pose.rotation @ np.array(
-            [touching_place.x, self.side.wheelset.arm + touching_place.wheel_y, height_below]
-        )
+        height_below = math.sqrt(self._radius(touch) ** 2 - touch.x**2)
+        return pose.rotation @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, height_below])
 
-    def _patch_reports(self, loaded_wheel: LoadedWheel) -> tuple[PatchReport, ...]:
+    def _patch_reports(self, wheel: LoadedWheel) -> tuple[PatchReport, ...]:
         """Reports of all patches of a wheel that carry load; patches that have grown together get one common report."""
         rows = [
             row
-            for row in zip(
-                loaded_wheel.touches, loaded_wheel.creepages, loaded_wheel.forces, loaded_wheel.shares, strict=True
-            )
+            for row in zip(wheel.touches, wheel.creepages, wheel.forces, wheel.shares, strict=True)
             if row[-1].load > 0.0
         ]
         pieces = dict.fromkeys(share.piece for *_, share in rows)
-        return tuple(
-            self._joined_report(loaded_wheel, [row for row in rows if row[-1].piece == piece]) for piece in pieces
-        )
+        return tuple(self._joined_report(wheel, [row for row in rows if row[-1].piece == piece]) for piece in pieces)
 
     def _joined_report(
-        self,
-        loaded_wheel: LoadedWheel,
-        patch_rows: list[tuple[TouchingPlace, ForceOrCreepage, ForceOrCreepage, PatchShare]],
+        self, wheel: LoadedWheel, patch_rows: list[tuple[TouchingPlace, ForceOrCreepage, ForceOrCreepage, PatchShare]]
     ) -> PatchReport:
         """Report of one connected piece of the contact area; its first touch and creepages are those of the patch with
         the largest load."""
         side, (touch, creepage, _, _) = self.side, max(patch_rows, key=lambda row: row[-1].load)
-        top, start = float(side.rail.y[np.argmin(side.rail.z)]), self._arm(loaded_wheel.pose, touch)
+        top, start = float(side.rail.y[np.argmin(side.rail.z)]), self._arm(wheel.pose, touch)
         loads = np.array([share.load for *_, share in patch_rows])
         centres = [
             (patch.rail_y + top + share.y * math.cos(patch.angle), patch.x + share.x)
@@ -346,7 +329,7 @@ class WheelsetContact:
         y, x = (float(np.average(values, weights=loads)) for values in zip(*centres, strict=True))
         fx, fy = (float(sum(force[k] for _, _, force, _ in patch_rows)) for k in (0, 1))
         mz = sum(
-            float(_surface_axes(touch)[1] @ _patch_moment(self._arm(loaded_wheel.pose, patch) - start, patch, force))
+            float(_rail_surface_axes(touch)[1] @ _patch_moment(self._arm(wheel.pose, patch) - start, patch, force))
             for patch, _, force, _ in patch_rows
         )
         boxes = np.array([share.box for *_, share in patch_rows])
@@ -373,7 +356,7 @@ class WheelsetContact:
             sum(share.area for *_, share in patch_rows),
             length,
             width,
-            loaded_wheel.approach,
+            wheel.approach,
         )
 
 
@@ -398,14 +381,14 @@ def rolling_radius_difference(placement: WheelsetPlacement) -> float:
     return right.rolling_radius - left.rolling_radius
 
 
-def _surface_axes(touching_place: TouchingPlace) -> tuple[Array, Array]:
+def _rail_surface_axes(touch: TouchingPlace) -> tuple[Array, Array]:
     """Unit vectors along the rail's surface and along its inward normal, in the track's axes."""
-    cosine, sine = math.cos(touching_place.angle), math.sin(touching_place.angle)
+    cosine, sine = math.cos(touch.angle), math.sin(touch.angle)
     return np.array([0.0, cosine, sine]), np.array([0.0, -sine, cosine])
 
 
-def _patch_moment(lever: Array, touching_place: TouchingPlace, creep_force: ForceOrCreepage) -> Array:
+def _patch_moment(lever: Array, touch: TouchingPlace, creep_force: ForceOrCreepage) -> Array:
     """Moment (3,) of a patch's creep forces and spin moment about a point; ``lever`` is the vector (m) from that point
     to the patch."""
-    across, into = _surface_axes(touching_place)
+    across, into = _rail_surface_axes(touch)
     return np.cross(lever, creep_force[0] * np.array([1.0, 0.0, 0.0]) + creep_force[1] * across) + creep_force[2] * into

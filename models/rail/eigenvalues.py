@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from models.rail.equations import Equations, rate_jacobian
+from models.rail.equations import WheelsetEquations, rate_jacobian
 from models.rail.wheelset import Wheelset
 
 SLOW_SPEED = 0.2
@@ -18,18 +18,18 @@ def free_wheelset(wheelset: Wheelset) -> Wheelset:
     return wheelset.changed(**{f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"})
 
 
-def wavelength(equations_type: type[Equations], wheelset: Wheelset) -> float:
+def hunting_wavelength(equations_type: type[WheelsetEquations], wheelset: Wheelset) -> float:
     """Wavelength (m) of the free wheelset, from the slowest oscillation among the eigenvalues."""
-    roots = eigenvalues(equations_type, free_wheelset(wheelset), SLOW_SPEED)
+    roots = eigenvalues_at_speed(equations_type, free_wheelset(wheelset), SLOW_SPEED)
     return 2.0 * math.pi * SLOW_SPEED / min(roots[roots.imag > 0.0], key=abs).imag
 
 
-def eigenvalues(equations_type: type[Equations], wheelset: Wheelset, speed: float) -> np.ndarray:
+def eigenvalues_at_speed(equations_type: type[WheelsetEquations], wheelset: Wheelset, speed: float) -> np.ndarray:
     """Eigenvalues (9,) in 1/s of the wheelset at a speed (m/s)."""
     return np.linalg.eigvals(equations_type(wheelset, speed, "linear").state_matrix)
 
 
-def hunting_uncertainty(equations_type: type[Equations], wheelset: Wheelset, speed: float) -> float:
+def hunting_uncertainty(equations_type: type[WheelsetEquations], wheelset: Wheelset, speed: float) -> float:
     """Uncertainty (1/s) of the hunting eigenvalue: its change when slopes are taken over twice the distance; NaN
     without a hunting mode."""
     equations = equations_type(wheelset, speed, "linear")
@@ -37,15 +37,15 @@ def hunting_uncertainty(equations_type: type[Equations], wheelset: Wheelset, spe
     return float(abs(hunting_eigenvalue(wide) - hunting_eigenvalue(np.linalg.eigvals(equations.state_matrix))))
 
 
-def largest_growth(equations_type: type[Equations], wheelset: Wheelset, speed: float) -> float:
+def largest_growth_rate(equations_type: type[WheelsetEquations], wheelset: Wheelset, speed: float) -> float:
     """Largest real part (1/s) of the wheelset's eigenvalues at a speed (m/s), as an argument for
     ``linear.critical_speed``."""
-    return float(eigenvalues(equations_type, wheelset, speed).real.max())
+    return float(eigenvalues_at_speed(equations_type, wheelset, speed).real.max())
 
 
-def root_locus(equations_type: type[Equations], wheelset: Wheelset, speeds: Iterable[float]) -> np.ndarray:
+def root_locus(equations_type: type[WheelsetEquations], wheelset: Wheelset, speeds: Iterable[float]) -> np.ndarray:
     """Eigenvalues (speeds, 9) in 1/s of the wheelset at each speed (m/s), for a root locus."""
-    return np.array([eigenvalues(equations_type, wheelset, float(speed)) for speed in speeds])
+    return np.array([eigenvalues_at_speed(equations_type, wheelset, float(speed)) for speed in speeds])
 
 
 def hunting_eigenvalue(eigenvalues_of_wheelset: np.ndarray) -> np.ndarray:

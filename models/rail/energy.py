@@ -21,8 +21,8 @@ from models.rail.equations import (
     YAW,
     YAW_RATE,
     Z_RATE,
-    Body,
-    Equations,
+    WheelsetBody,
+    WheelsetEquations,
     WheelsetPath,
     Y,
     Z,
@@ -31,7 +31,7 @@ from models.rail.wheelset import GRAVITY
 
 
 @dataclass(frozen=True, eq=False)
-class Ledger:
+class EnergyLedger:
     """Energy balance of a wheelset over time: energies (n,) in J at times (n,) in s; works count from the path's start,
     works done by the wheelset positive."""
 
@@ -52,19 +52,19 @@ class Ledger:
         return stored - stored[0] - (self.drive - self.dampers - self.contact_damping - self.creep)
 
 
-def energy_ledger(wheelset_equations: Equations, wheelset_path: WheelsetPath) -> Ledger:
+def energy_ledger(wheelset_equations: WheelsetEquations, wheelset_path: WheelsetPath) -> EnergyLedger:
     """Energy balance along a path computed by RK4, of which every step must be stored."""
     start, step = wheelset_path.states[:-1], np.diff(wheelset_path.times)[:, None]
     works, rates = np.zeros((len(wheelset_path.times), 5)), np.zeros_like(start)
     for stage_fraction, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
         rates, powers = rates_and_powers(wheelset_equations, start + stage_fraction * step * rates)
         works[1:] += weight / 6.0 * step * powers
-    return Ledger(
+    return EnergyLedger(
         wheelset_path.times, *energies_at_states(wheelset_equations, wheelset_path.states), *works.cumsum(axis=0).T
     )
 
 
-def rates_and_powers(wheelset_equations: Equations, wheelset_states: Array) -> tuple[Array, Array]:
+def rates_and_powers(wheelset_equations: WheelsetEquations, wheelset_states: Array) -> tuple[Array, Array]:
     """Rates (n, 10) of the states, and powers (n, 5) in W whose integrals are the works, in the order of the ledger."""
     rates, contacts = wheelset_equations.at(wheelset_states)
     names = "elastic_power", "fx", "damping_power", "power"
@@ -76,8 +76,10 @@ def rates_and_powers(wheelset_equations: Equations, wheelset_states: Array) -> t
     return rates, np.column_stack([elastic, drive, dampers, damping, creep])
 
 
-def energies_at_states(wheelset_equations: Equations, wheelset_states: Array) -> tuple[Array, Array, Array]:
-    """Energies (n,) in J at wheelset_states (n, 10): kinetic energy, energy of the springs, and potential energy of gravity."""
+def energies_at_states(wheelset_equations: WheelsetEquations, wheelset_states: Array) -> tuple[Array, Array, Array]:
+    """Energies (n,) in J at wheelset_states (n, 10): kinetic energy, energy of the springs, and potential energy of
+    gravity.
+    """
     w, body = wheelset_equations.wheelset, wheelset_equations.body
     across = wheelset_states[:, ROLL_RATE] ** 2 + (wheelset_states[:, YAW_RATE] * np.cos(wheelset_states[:, ROLL])) ** 2
     squared_speed = wheelset_states[:, Y_RATE] ** 2 + wheelset_states[:, Z_RATE] ** 2
@@ -89,7 +91,7 @@ def energies_at_states(wheelset_equations: Equations, wheelset_states: Array) ->
     )
 
 
-def _spring_energy_and_damping(wheelset_body: Body, wheelset_states: Array) -> tuple[Array, Array]:
+def _spring_energy_and_damping(wheelset_body: WheelsetBody, wheelset_states: Array) -> tuple[Array, Array]:
     """Energy stored in the suspension springs (n,) in J, and power dissipated in the dampers (n,) in W."""
     (cr, sr), (cy, sy) = ((np.cos(wheelset_states[:, k]), np.sin(wheelset_states[:, k])) for k in (ROLL, YAW))
     axle = np.array([-sy * cr, cy * cr, sr])

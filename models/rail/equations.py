@@ -11,8 +11,8 @@ the centre, I across and J along the axle,
     J spin'           = M2
     I yaw'' cos roll  = M3 + 2 I roll' yaw' sin roll - J spin roll'
 
-Forces: both rails' (``wheel_forces``), the weight, and a spring and a damper along each axis of the track at each end
-of the suspension, free of force in the middle of the track but for the vehicle's weight. On a track that leans both
+Forces: both rails' (``fill_wheel_forces``), the weight, and a spring and a damper along each axis of the track at each
+end of the suspension, free of force in the middle of the track but for the vehicle's weight. On a track that leans both
 wheelset and vehicle weigh to the right as well.
 """
 
@@ -32,17 +32,17 @@ from models.core.steps import divides
 from models.core.trajectory import Trajectory
 from models.machine.compiled import lean, njit
 from models.machine.records import size_of
-from models.rail.profile_contact import Pose
+from models.rail.profile_contact import WheelPose
 from models.rail.wheel_forces import (
     LAW_NUMBERS,
-    REPORT,
-    Rails,
+    REPORT_RECORD,
+    RailsAndWheels,
     count_of_patches,
+    fill_wheel_forces,
     plain_rails,
     rails_from_tuples,
     rails_of,
     supported_force,
-    wheel_forces,
     workspace_for,
 )
 from models.rail.wheelset import GRAVITY, Wheelset
@@ -60,7 +60,7 @@ DERAILED_LIMIT = 0.3
 """Sum of the magnitudes of yaw and roll (rad) and displacements (m) from which the wheelset counts as derailed."""
 DEEPEST_POSITION = 5e-3
 """Lowest position z (m, down) searched at which the rails carry the load."""
-NO_REPORT = np.empty(0, REPORT)
+NO_REPORT = np.empty(0, REPORT_RECORD)
 """Report without rows, for rates without contact reports, which take longer to compute than the rates."""
 
 
@@ -68,7 +68,7 @@ TrackVector = tuple[float, float, float]
 """Values along the track's axes x, y, z."""
 
 
-class Body(NamedTuple):
+class WheelsetBody(NamedTuple):
     """Body and suspension of a wheelset (SI): mass; inertia along and across the axle; half spacing of the springs;
     springs and dampers of one side; weight of the vehicle on each side; position z (m, down) at which the springs
     carry exactly that weight; lean of the track; whether there is a spring or a damper."""
@@ -85,7 +85,7 @@ class Body(NamedTuple):
     has_suspension: bool
 
 
-class Stages(NamedTuple):
+class RungeKuttaArrays(NamedTuple):
     """Work arrays for a Runge-Kutta step: sum of the rates, rates and state of a stage (10,); a report without rows."""
 
     summed_rate: Array
@@ -95,17 +95,17 @@ class Stages(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def rates(wheelset_state, speed, wheelset_body, rails, state_rate, contact_report):
-    """Fill ``state_rate`` with the time derivative of a state (10,), and ``contact_report``, REPORT (patches,), with the
-    contacts.
+def fill_rates(wheelset_state, speed, wheelset_body, rails, state_rate, contact_report):
+    """Fill ``state_rate`` with the time derivative of a state (10,), and ``contact_report``, REPORT (patches,), with
+    the contacts.
 
-    speed, wheelset_body, rails : ``parameters`` of ``Equations``.
+    speed, wheelset_body, rails : ``parameters`` of ``WheelsetEquations``.
     """
     rails_record = rails_from_tuples(rails)
-    set_rates(
+    fill_rates_with_workspace(
         wheelset_state,
         speed,
-        Body(*wheelset_body),
+        WheelsetBody(*wheelset_body),
         rails_record,
         state_rate,
         contact_report,
@@ -114,9 +114,12 @@ def rates(wheelset_state, speed, wheelset_body, rails, state_rate, contact_repor
 
 
 @lean
-def set_rates(wheelset_state, speed, wheelset_body, rails, state_rate, contact_report, contact_workspace):
-    """Fill ``state_rate`` with the time derivative of a state (10,). contact_workspace : ``Workspace``, written over; contact_report :
-    has no rows where no contact report is wanted."""
+def fill_rates_with_workspace(
+    wheelset_state, speed, wheelset_body, rails, state_rate, contact_report, contact_workspace
+):
+    """Fill ``state_rate`` with the time derivative of a state (10,). contact_workspace : ``Workspace``, written over;
+    contact_report : has no rows where no contact report is wanted.
+    """
     y, z, roll, yaw = wheelset_state[Y], wheelset_state[Z], wheelset_state[ROLL], wheelset_state[YAW]
     roll_rate, yaw_rate, spin = wheelset_state[ROLL_RATE], wheelset_state[YAW_RATE], wheelset_state[SPIN]
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
@@ -129,7 +132,7 @@ def set_rates(wheelset_state, speed, wheelset_body, rails, state_rate, contact_r
     rolling = spin - yaw_rate * sr  # of the wheel against the axes that do not spin
     turning[0], turning[1] = cy * roll_rate + axle_x * rolling, sy * roll_rate + axle_y * rolling
     turning[2] = yaw_rate + axle_z * rolling
-    wheel_forces(Pose(y, z, roll, yaw), rails, contact_report, contact_workspace)
+    fill_wheel_forces(WheelPose(y, z, roll, yaw), rails, contact_report, contact_workspace)
     force[1] += 2.0 * wheelset_body.carried_weight * wheelset_body.lean
     force[2] += 2.0 * wheelset_body.carried_weight
     if wheelset_body.has_suspension:
@@ -174,10 +177,12 @@ def _add_suspension_forces(wheelset_state, wheelset_body, angular_velocity, axle
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
-def march(wheelset_state, parameters, time_steps, path_states, contact_reports, contact_workspace, runge_kutta_arrays):
+def march_wheelset(
+    wheelset_state, parameters, time_steps, path_states, contact_reports, contact_workspace, runge_kutta_arrays
+):
     """Integrate from ``wheelset_state`` by RK4; the state is modified. Returns the number of steps made.
 
-    parameters : of ``Equations``; time_steps : length (s) of a step, count of steps, and after how many steps one
+    parameters : of ``WheelsetEquations``; time_steps : length (s) of a step, count of steps, and after how many steps one
     goes into path and reports; contact_workspace, runge_kutta_arrays : arrays of the caller, to which no reference is held, which saves
     5 % of the time of a bare wheelset."""
     (speed, plain_body, plain_tuples), (step, count, stride), (total, rate, stage_state, no_report) = (
@@ -194,7 +199,7 @@ def march(wheelset_state, parameters, time_steps, path_states, contact_reports, 
             stage_step = step if stage == 3 else 0.5 * step
             for k in range(STATE_COUNT):  # a sum of whole arrays would make one
                 stage_state[k] = wheelset_state[k] + stage_step * rate[k] if stage > 0 else wheelset_state[k]
-            set_rates(stage_state, speed, body, rails, rate, report, contact_workspace)
+            fill_rates_with_workspace(stage_state, speed, body, rails, rate, report, contact_workspace)
             for k in range(STATE_COUNT):
                 total[k] = total[k] + (1.0 if stage == 3 else 2.0) * rate[k] if stage > 0 else rate[k]
             if is_recorded:
@@ -214,14 +219,15 @@ def march(wheelset_state, parameters, time_steps, path_states, contact_reports, 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WheelsetPath(Trajectory):
-    """Motion of a wheelset over time: states (n, 10) as above; contacts, REPORT (n, patches) of ``wheel_forces``, the
-    right wheel's first."""
+    """Motion of a wheelset over time: states (n, 10) as above; contacts, REPORT (n, patches) of ``fill_wheel_forces``,
+    the right wheel's first.
+    """
 
     contacts: Array
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
+class WheelsetEquations:
     """Equations of motion of a wheelset that travels at a speed (m/s), or stands. law : creep law, "linear" or
     "fastsim"; cells : of FASTSIM's strips.
 
@@ -244,7 +250,7 @@ class Equations:
         checked_number("lean", self.lean, "a slope across the track from -1 to 1", -1.0, 1.0)
 
     @cached_property
-    def body(self) -> Body:
+    def body(self) -> WheelsetBody:
         """Body and suspension of the wheelset."""
         w = self.wheelset
         carried = (w.load - w.mass * GRAVITY) / 2.0
@@ -255,10 +261,12 @@ class Equations:
         stiffness, damping = (w.stiffness_x, w.stiffness_y, w.stiffness_z), (w.damping_x, w.damping_y, w.damping_z)
         has_suspension = any(stiffness + damping)
         inertia = w.mass, w.spin_inertia, w.yaw_inertia
-        return Body(*inertia, w.half_spacing, stiffness, damping, carried, sunk, float(self.lean), has_suspension)
+        return WheelsetBody(
+            *inertia, w.half_spacing, stiffness, damping, carried, sunk, float(self.lean), has_suspension
+        )
 
     @cached_property
-    def rails(self) -> Rails:
+    def rails(self) -> RailsAndWheels:
         """Compiled record of the rails or profiles that the wheels roll on."""
         return rails_of(self.wheelset, self.law, self.cells)
 
@@ -280,12 +288,12 @@ class Equations:
 
         Filled as doubles: as records numpy fills them in four times the time, which is that of the rates at two states.
         """
-        return np.full((*array_shape, self.patch_count * size_of(REPORT)), np.nan).view(REPORT)
+        return np.full((*array_shape, self.patch_count * size_of(REPORT_RECORD)), np.nan).view(REPORT_RECORD)
 
     def rates(self, wheelset_state: Array) -> Array:
         """Time derivative (10,) of a wheelset's state (10,)."""
         state_rate = np.empty(STATE_COUNT)
-        rates(np.asarray(wheelset_state, float), *self.parameters, state_rate, NO_REPORT)
+        fill_rates(np.asarray(wheelset_state, float), *self.parameters, state_rate, NO_REPORT)
         return state_rate
 
     def at(self, wheelset_states: Array) -> tuple[Array, Array]:
@@ -293,7 +301,7 @@ class Equations:
         patches)."""
         state_rates, contacts = np.empty_like(wheelset_states), self.empty_contacts(len(wheelset_states))
         for state, rate, contact in zip(wheelset_states, state_rates, contacts, strict=True):
-            rates(state, *self.parameters, rate, contact)
+            fill_rates(state, *self.parameters, rate, contact)
         return state_rates, contacts
 
     @cached_property
@@ -349,7 +357,8 @@ class Equations:
         return float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
 
     def run(self, wheelset_state: Array, duration: float, time_step: float, storing_stride: int = 1) -> WheelsetPath:
-        """Integrate by RK4 from a state (10,) over a duration (s) with a step (s); every ``storing_stride``-th step is stored.
+        """Integrate by RK4 from a state (10,) over a duration (s) with a step (s); every ``storing_stride``-th step is
+        stored.
 
         Raises InputError for a state that is no wheelset's, a step too large for the fastest motion, or a duration that
         is no whole number of steps; RunFailed if the wheelset leaves the track, or if the step was too large for the
@@ -367,7 +376,7 @@ class Equations:
         """States and contacts at every ``storing_stride``-th step of a path; ``wheelset_state`` (10,) is modified."""
         row_count = step_count // storing_stride + 1
         states, contacts = np.empty((row_count, STATE_COUNT)), self.empty_contacts(row_count)
-        steps_done = self.march(wheelset_state, (time_step, step_count, storing_stride), states, contacts)
+        steps_done = self.march_wheelset(wheelset_state, (time_step, step_count, storing_stride), states, contacts)
         if steps_done < step_count:
             raise RunFailed("wheelset", "leaves the track", steps_done * time_step)
         return states, contacts
@@ -396,7 +405,9 @@ class Equations:
         is then wrong."""
         for k in sorted(set(path_states.contacts["load"].argmax(axis=0))):
             rate = float(
-                np.abs(np.linalg.eigvals(rate_jacobian(partial(Equations.rates, self), path_states.states[k]))).max()
+                np.abs(
+                    np.linalg.eigvals(rate_jacobian(partial(WheelsetEquations.rates, self), path_states.states[k]))
+                ).max()
             )
             if not time_step * rate <= LIMIT_OF_RK4:
                 raise RunFailed(

@@ -163,7 +163,9 @@ def _parabola_roots(begin_value: float, middle_value: float, end_value: float) -
 def _wave_from_turning_point(
     radius_table: RollingRadiusTable, left_turning_point: float, amplitude: float
 ) -> KlingelWave | None:
-    """The wave whose left turning point is ``left_turning_point``; None if the motion would stop before the other turning point."""
+    """The wave whose left turning point is ``left_turning_point``; None if the motion would stop before the other
+    turning point.
+    """
     y, dr = radius_table.section(left_turning_point, left_turning_point + 2.0 * amplitude)
     if dr[0] > 0.0 or dr[-1] < 0.0:
         return None
@@ -198,8 +200,9 @@ def _swing_energy(radius_difference: Array, swing_lengths: Array) -> Array:
 
 
 def _lowest_energy(radius_difference: Array, swing_lengths: Array, swing_energy: Array) -> Array:
-    """Energies at the maxima of the potential inside pieces of the table, where a falling difference ``radius_difference`` passes
-    zero."""
+    """Energies at the maxima of the potential inside pieces of the table, where a falling difference
+    ``radius_difference`` passes zero.
+    """
     falls = (radius_difference[:-1] > 0.0) & (radius_difference[1:] < 0.0) & (swing_lengths > 0.0)
     distance_to_zero = (
         swing_lengths[falls] * radius_difference[:-1][falls] / (radius_difference[:-1] - radius_difference[1:])[falls]
@@ -257,8 +260,9 @@ def harmonic_linearised_conicity(
     """Conicity of the cones whose rolling radius difference has the same first harmonic as the wheels', for lateral
     motion as ``amplitude`` times a sine.
 
-    displacements : (n,) ascending, over the whole of the swing about ``swing_centre``, or from 0 on for wheels that are alike
-    and a swing about 0; radius_differences : (n,) of the rolling radii, right less left. All in one unit of length.
+    displacements : (n,) ascending, over the whole of the swing about ``swing_centre``, or from 0 on for wheels that are
+    alike and a swing about 0; radius_differences : (n,) of the rolling radii, right less left. All in one unit of
+    length.
     """
     displacements, radius_differences = np.asarray(displacements, float), np.asarray(radius_differences, float)
     if displacements[0] == 0.0:

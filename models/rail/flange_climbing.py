@@ -19,7 +19,7 @@ def nadal_limit(friction: float, flange_angle: float = FLANGE_ANGLE) -> float:
     return (math.tan(flange_angle) - friction) / (1.0 + friction * math.tan(flange_angle))
 
 
-def bound_shares(forces: np.ndarray, force_bounds: np.ndarray) -> np.ndarray:
+def shares_of_bounds(forces: np.ndarray, force_bounds: np.ndarray) -> np.ndarray:
     """Ratios of the magnitudes of forces to their bounds, arrays of equal shape: 0 where there is no force, infinite
     where the bound is zero."""
     forces = np.abs(forces)

@@ -29,22 +29,22 @@ from models.rail.equations import (
     Y,
     Z,
 )
-from models.rail.profile_contact import PROFILE_COUNTS, RAIL_KNOT, WHEEL_NODE, LaidProfile, Pose
-from models.rail.wheel_forces import REPORT, WHEELS, Rails, wheel_forces, workspace_for
+from models.rail.profile_contact import PROFILE_COUNTS, RAIL_KNOT_RECORD, WHEEL_NODE_RECORD, LaidProfile, WheelPose
+from models.rail.wheel_forces import REPORT_RECORD, WHEELS_RECORD, RailsAndWheels, fill_wheel_forces, workspace_for
 
 JOINTS = 5
 TABLE_HEAD = record("speed", "law", "middle", "nodes", "knots", "strips", "cells")
 """Head of the table: speed (m/s), creep law, FASTSIM's middle; counts of the wheel's nodes, of the rail's knots, of
 strips and of cells. Then WHEELS, PROFILE_COUNTS, nodes, knots, and FASTSIM's strips and cells."""
 HEAD_SIZE, WHEELS_SIZE, PROFILE_SIZE, NODE_SIZE, KNOT_SIZE = (
-    size_of(kind) for kind in (TABLE_HEAD, WHEELS, PROFILE_COUNTS, WHEEL_NODE, RAIL_KNOT)
+    size_of(kind) for kind in (TABLE_HEAD, WHEELS_RECORD, PROFILE_COUNTS, WHEEL_NODE_RECORD, RAIL_KNOT_RECORD)
 )
 PER_STRIP, PER_CELL = 4, 5
 """Count of numbers of a strip and of a cell, see ``fastsim_grid``."""
 _POSITIONS, _RATES = [Y, Z, YAW, ROLL, ANGLE], [Y_RATE, Z_RATE, YAW_RATE, ROLL_RATE, SPIN]
 
 
-def table(speed: float, rails: Rails) -> Array:
+def joint_force_table(speed: float, rails: RailsAndWheels) -> Array:
     """Table of the numbers that the compiled joint forces of a wheelset read."""
     strips, cells, (profile, nodes, knots) = rails.strips, rails.cells, rails.profile
     head = [speed, rails.law, rails.middle, nodes.size, knots.size, strips.shape[1], cells.shape[1]]
@@ -54,7 +54,7 @@ def table(speed: float, rails: Rails) -> Array:
 
 @inlined
 def rails_from_table(table_pointer):
-    """``Rails`` as views of the table at a pointer to doubles."""
+    """``RailsAndWheels`` as views of the table at a pointer to doubles."""
     head = records(table_pointer, 1, TABLE_HEAD)[0]
     nodes, knots, strips, cells = int(head.nodes), int(head.knots), int(head.strips), int(head.cells)
     wheels = beyond(table_pointer, HEAD_SIZE)
@@ -63,12 +63,12 @@ def rails_from_table(table_pointer):
     first_knot = beyond(first_node, NODE_SIZE * nodes)
     first_strip = beyond(first_knot, KNOT_SIZE * knots)
     first_cell = beyond(first_strip, PER_STRIP * strips)
-    return Rails(
-        records(wheels, 1, WHEELS),
+    return RailsAndWheels(
+        records(wheels, 1, WHEELS_RECORD),
         LaidProfile(
             records(profile, 1, PROFILE_COUNTS),
-            records(first_node, nodes, WHEEL_NODE),
-            records(first_knot, knots, RAIL_KNOT),
+            records(first_node, nodes, WHEEL_NODE_RECORD),
+            records(first_knot, knots, RAIL_KNOT_RECORD),
         ),
         array(first_strip, (PER_STRIP, strips)),
         array(first_cell, (PER_CELL, cells)),
@@ -126,7 +126,7 @@ def joint_forces(table_pointer, t, q, v, forces_out):
     turning[2] = yaw_rate + axle_z * spin
     for k in range(3):
         force[k] = moment[k] = 0.0
-    wheel_forces(Pose(y, z, roll, yaw), rails, np.empty(0, REPORT), room)
+    fill_wheel_forces(WheelPose(y, z, roll, yaw), rails, np.empty(0, REPORT_RECORD), room)
     joint_forces_view[0] += force[1]
     joint_forces_view[1] += force[2]
     joint_forces_view[2] += moment[2]

@@ -23,7 +23,7 @@ from models.contact.wheel_on_rail import (
 from models.core.errors import InputError
 from models.core.scene_file import SceneFile
 from models.core.strict import Strict, quantity
-from models.rail.profile_contact import PROFILE_COUNTS, RAIL_KNOT, WHEEL_NODE, LaidProfile
+from models.rail.profile_contact import PROFILE_COUNTS, RAIL_KNOT_RECORD, WHEEL_NODE_RECORD, LaidProfile
 
 BUILT_IN = {"wheel": BUILT_IN_WHEELS, "rail": BUILT_IN_RAILS}
 NODE_SPACING, KNOT_SPACING = 1e-4, 2.5e-4
@@ -39,7 +39,7 @@ BLEND_HALF_LENGTH = 1e-3
 """Half the length (m) of the transition from one zone of the contour to the next."""
 
 
-class Profiles(Strict):
+class CrossSections(Strict):
     """Cross-sections in place of cones and round heads; the wheel's ``radius`` is that at the taping line.
 
     wheel, rail : the name of a built-in profile, or a file that ``models.contact.profile_files`` reads.
@@ -56,7 +56,7 @@ class Profiles(Strict):
     back_to_back: float = quantity("m", "between the backs of the flanges", default=1.360)
     taping: float = quantity("m", "from a flange's back to the taping line", default=0.070)
 
-    def with_full_paths(self, scene: SceneFile) -> "Profiles":
+    def with_full_paths(self, scene: SceneFile) -> "CrossSections":
         """These profiles with full paths of the files. Raises InputError for a name that is neither a file nor built
         in."""
         files = {}
@@ -95,7 +95,7 @@ def _contact_profile(profile_name: str, profile_kind: ProfileKind, smoothing: fl
 
 
 @cache
-def laid_profile(profiles: Profiles, wheel_radius: float) -> LaidProfile:
+def laid_profile(profiles: CrossSections, wheel_radius: float) -> LaidProfile:
     """``LaidProfile`` that ``profile_on_rail`` reads, for wheels with a radius (m) at the taping line."""
     from scipy.interpolate import CubicSpline
 
@@ -116,13 +116,16 @@ def laid_profile(profiles: Profiles, wheel_radius: float) -> LaidProfile:
     level = wheel_on_rail.clearance(WheelsetPose(0.0, 0.0, 0.0, 0.0)) - wheel_radius
     head = [[int(nodes[:, 3].max()) + 1, len(nodes), len(rail), NODE_SPACING, wheel_on_rail.wheelset.arm, level]]
     return LaidProfile(
-        *(_read_only_records(*pair) for pair in ((head, PROFILE_COUNTS), (nodes, WHEEL_NODE), (rail, RAIL_KNOT)))
+        *(
+            _read_only_records(*pair)
+            for pair in ((head, PROFILE_COUNTS), (nodes, WHEEL_NODE_RECORD), (rail, RAIL_KNOT_RECORD))
+        )
     )
 
 
-def no_profile() -> LaidProfile:
+def empty_profile() -> LaidProfile:
     """An empty profile, for a wheelset on cones: no zones, nodes or knots."""
-    return LaidProfile(np.zeros(1, PROFILE_COUNTS), np.empty(0, WHEEL_NODE), np.empty(0, RAIL_KNOT))
+    return LaidProfile(np.zeros(1, PROFILE_COUNTS), np.empty(0, WHEEL_NODE_RECORD), np.empty(0, RAIL_KNOT_RECORD))
 
 
 def _read_only_records(number_rows: Any, record_type: np.dtype) -> Array:

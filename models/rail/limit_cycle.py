@@ -26,12 +26,12 @@ import numpy as np
 from models.contact.inputs import Array
 from models.core.errors import InputError, RunFailed
 from models.ensemble.runner import block_results
-from models.rail.equations import ANGLE, STATE_COUNT, Y_RATE, Equations, WheelsetPath, Y
+from models.rail.equations import ANGLE, STATE_COUNT, Y_RATE, WheelsetEquations, WheelsetPath, Y
 from models.rail.linear import critical_speed
 from models.rail.wheelset import Wheelset
 
 SoughtQuantity = Literal["amplitude", "speed"]
-STATE_SIZES = np.array([1e-3, 1e-4, 1e-4, 1e-3, 1.0, 1e-2, 1e-2, 1e-2, 1e-2, 1.0])
+TYPICAL_STATE_SIZES = np.array([1e-3, 1e-4, 1e-4, 1e-3, 1.0, 1e-2, 1e-2, 1e-2, 1e-2, 1.0])
 """Typical sizes of the states (m, rad, m/s, rad/s), by which differences of the states are scaled."""
 CLOSURE_TOLERANCE = 1e-9
 """Largest scaled difference between the start and end of a period at which the orbit counts as closed."""
@@ -74,7 +74,7 @@ class Orbit:
     state before, the speed and the period, in units of STATE_SIZES, 1 m/s and the period. error : change of the unknown
     when the step is halved, frequency_error : Hz; both NaN where the step was not halved."""
 
-    equations: Equations
+    equations: WheelsetEquations
     state: Array
     period: float
     step_count: int
@@ -115,7 +115,11 @@ class Orbit:
 
 
 def guess_near_state(
-    equations: Equations, start_state: Array, orbit_period: float, time_step: float, executor: Executor | None = None
+    equations: WheelsetEquations,
+    start_state: Array,
+    orbit_period: float,
+    time_step: float,
+    executor: Executor | None = None,
 ) -> Orbit:
     """Initial guess for ``solved_orbit``: a state (10,) near a maximum of y, and a period (s) divided into steps of at
     most ``time_step`` (s)."""
@@ -127,12 +131,12 @@ def guess_near_state(
 
 
 def orbit_of_small_amplitude(
-    equations: Equations, amplitude: float, time_step: float, executor: Executor | None = None
+    equations: WheelsetEquations, amplitude: float, time_step: float, executor: Executor | None = None
 ) -> Orbit:
     """Orbit of a small amplitude (m), found from the linear motion that neither grows nor decays at the critical speed.
 
-    time_step : s, about. Raises NoCriticalSpeed if there is no such motion, RunFailed if it leads to no orbit, as where the
-    amplitude is so small that cells of FASTSIM begin to slide one by one.
+    time_step : s, about. Raises NoCriticalSpeed if there is no such motion, RunFailed if it leads to no orbit, as where
+    the amplitude is so small that cells of FASTSIM begin to slide one by one.
     """
 
     def growth(_equations_type: Wheelset, speed: float) -> float:
@@ -147,7 +151,7 @@ def orbit_of_small_amplitude(
     return solved_orbit(guess, "speed", executor=executor)
 
 
-def guess_from_orbit(known_orbit: Orbit, equations: Equations) -> Orbit:
+def guess_from_orbit(known_orbit: Orbit, equations: WheelsetEquations) -> Orbit:
     """Initial guess for the orbit of changed equations: the known orbit, with its distance from rest enlarged by the
     share DISPLACED_GUESS."""
     rest_state = known_orbit.equations.rest
@@ -216,7 +220,7 @@ def solved_orbit(
             end = _state_after(orbit.equations, orbit.state, orbit.period, orbit.step_count)
         except (InputError, RunFailed):  # a correction that led away: off the track, to a speed or period that is none
             break
-        missed = ((end - orbit.state) / STATE_SIZES)[RETURNING_STATES]
+        missed = ((end - orbit.state) / TYPICAL_STATE_SIZES)[RETURNING_STATES]
         size = float(np.abs(missed).max())
         if size < CLOSURE_TOLERANCE:
             return orbit if fresh or not is_precise else _with_return_slopes(orbit, executor)
@@ -243,11 +247,11 @@ def refined_orbit(known_orbit: Orbit, sought_quantity: SoughtQuantity, executor:
     )
 
 
-def _state_after(equations: Equations, start_state: Array, orbit_period: float, step_count: int) -> Array:
+def _state_after(equations: WheelsetEquations, start_state: Array, orbit_period: float, step_count: int) -> Array:
     return equations.run(start_state, orbit_period, orbit_period / step_count, step_count).states[-1]
 
 
-OrbitGuess = tuple[Equations, Array, float]
+OrbitGuess = tuple[WheelsetEquations, Array, float]
 """Start of an orbit: equations, state (10,) and period (s)."""
 
 
@@ -256,7 +260,10 @@ def _with_return_slopes(known_orbit: Orbit, executor: Executor | None) -> Orbit:
     eq, T, state, signs = known_orbit.equations, known_orbit.period, known_orbit.state, (-1.0, 1.0)
     pairs: list[list[OrbitGuess]] = [
         *(
-            [(eq, state + sign * DIFFERENCE_SHARE * STATE_SIZES[k] * np.eye(STATE_COUNT)[k], T) for sign in signs]
+            [
+                (eq, state + sign * DIFFERENCE_SHARE * TYPICAL_STATE_SIZES[k] * np.eye(STATE_COUNT)[k], T)
+                for sign in signs
+            ]
             for k in RETURNING_STATES
         ),
         [(replace(eq, speed=eq.speed + sign * DIFFERENCE_SHARE), state, T) for sign in signs],
@@ -264,7 +271,7 @@ def _with_return_slopes(known_orbit: Orbit, executor: Executor | None) -> Orbit:
     ]
     ends = block_results(partial(_ends_of_period, step_count=known_orbit.step_count), pairs, executor)
     columns = [
-        ((end_after - end_before) / (2.0 * DIFFERENCE_SHARE * STATE_SIZES))[RETURNING_STATES]
+        ((end_after - end_before) / (2.0 * DIFFERENCE_SHARE * TYPICAL_STATE_SIZES))[RETURNING_STATES]
         for end_before, end_after in ends
     ]
     return replace(known_orbit, return_slopes=np.array(columns).T)
@@ -283,17 +290,17 @@ def _newton_corrected(known_orbit: Orbit, period_mismatch: Array, sought_quantit
     *section, change, longer = -np.linalg.solve(returned[:, columns], period_mismatch)
     state, speed = known_orbit.state.copy(), known_orbit.speed
     state_indices = [RETURNING_STATES[k] for k in free]
-    state[state_indices] += section * STATE_SIZES[state_indices]
+    state[state_indices] += section * TYPICAL_STATE_SIZES[state_indices]
     if sought_quantity == "amplitude":
-        state[Y] += change * STATE_SIZES[Y]
+        state[Y] += change * TYPICAL_STATE_SIZES[Y]
     else:
         speed += change
     period = known_orbit.period * (1.0 + longer)
     return replace(known_orbit, equations=replace(known_orbit.equations, speed=speed), state=state, period=period)
 
 
-def attained_cycle(
-    equations: Equations,
+def attained_limit_cycle(
+    equations: WheelsetEquations,
     *,
     initial_displacement: float = 5e-3,
     time_step: float = 5e-4,
@@ -333,8 +340,8 @@ def positive_maxima(displacement_samples: Array) -> np.ndarray:
     )
 
 
-def bifurcation(
-    equations: Equations,
+def bifurcation_orbit(
+    equations: WheelsetEquations,
     lowest_speed: float,
     highest_speed: float,
     time_step: float = 5e-4,

@@ -53,7 +53,7 @@ class NoCriticalSpeed(InputError):
 
 
 @dataclass(frozen=True)
-class LinearWheelset:
+class LinearWheelsetMatrices:
     """Linear equations of motion M q'' + D q' + K q = 0 of a wheelset for q = (y, psi), lateral displacement and yaw;
     matrices (2, 2), SI units."""
 
@@ -84,8 +84,8 @@ def kalker_matrix(wheelset: Wheelset) -> Array:
     return pair.G * np.array([[area * c.c11, 0, 0], [0, area * c.c22, turn], [0, -turn, area**2 * c.c33]], float)
 
 
-def linear_matrices(wheelset: Wheelset, speed: float) -> LinearWheelset:
-    """``LinearWheelset`` at a speed (m/s), which must be above 0. Raises InputError otherwise."""
+def linear_matrices(wheelset: Wheelset, speed: float) -> LinearWheelsetMatrices:
+    """``LinearWheelsetMatrices`` at a speed (m/s), which must be above 0. Raises InputError otherwise."""
     if not 0.0 < speed < math.inf:
         raise InputError("", "speed", speed, "must be a speed above 0, in m/s")
     w, creep = wheelset, kalker_matrix(wheelset)
@@ -98,7 +98,7 @@ def linear_matrices(wheelset: Wheelset, speed: float) -> LinearWheelset:
     for motion, displacement in _contact_kinematics(w):
         damping += motion.T @ creep @ motion / speed
         stiffness += motion.T @ creep @ displacement
-    return LinearWheelset(
+    return LinearWheelsetMatrices(
         np.diag([w.mass + w.yaw_inertia * w.roll_per_displacement**2, w.yaw_inertia]), damping, stiffness
     )
 
@@ -136,16 +136,18 @@ def kinematic_wavelength(wheelset: Wheelset) -> float:
     return float(2.0 * math.pi / np.abs(values.imag).max())
 
 
-def largest_growth(wheelset: Wheelset, speed: float) -> float:
+def largest_growth_rate(wheelset: Wheelset, speed: float) -> float:
     """Largest real part (1/s) of the linear wheelset's eigenvalues at a speed (m/s)."""
     return float(np.linalg.eigvals(linear_matrices(wheelset, speed).state_matrix).real.max())
 
 
-def critical_speed(wheelset: Wheelset, growth_at_speed: Callable[[Wheelset, float], float] = largest_growth) -> float:
+def critical_speed(
+    wheelset: Wheelset, growth_at_speed: Callable[[Wheelset, float], float] = largest_growth_rate
+) -> float:
     """Lowest speed (m/s) at which a motion of the wheelset no longer decays.
 
-    growth_at_speed : largest real part of the eigenvalues as a function of wheelset and speed. Raises NoCriticalSpeed if the
-    wheelset is unstable at the lowest speed, or stable up to the highest one that is looked at.
+    growth_at_speed : largest real part of the eigenvalues as a function of wheelset and speed. Raises NoCriticalSpeed
+    if the wheelset is unstable at the lowest speed, or stable up to the highest one that is looked at.
     """
     speeds = np.geomspace(LOWEST_SPEED, HIGHEST_SPEED, SPEED_COUNT)
     slower = speeds[0]
@@ -167,7 +169,7 @@ def critical_speed(wheelset: Wheelset, growth_at_speed: Callable[[Wheelset, floa
 
 
 def critical_speed_or_reason(
-    wheelset: Wheelset, growth_at_speed: Callable[[Wheelset, float], float] = largest_growth
+    wheelset: Wheelset, growth_at_speed: Callable[[Wheelset, float], float] = largest_growth_rate
 ) -> tuple[float | None, str]:
     """Critical speed (m/s) of the wheelset and "", or None and the reason, as words that continue "the wheelset"."""
     try:

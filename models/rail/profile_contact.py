@@ -36,17 +36,17 @@ PROFILE_COUNTS = record("zones", "nodes", "knots", "spacing", "arm", "level")
 """Head of a laid profile: counts of zones, of the wheel's nodes and of the rail's knots; spacing of the nodes along the
 contour (m), distance of the taping line from the middle of the axle (m), height of the axle over the rail's top where
 both wheels just touch in the middle of the track (m)."""
-WHEEL_NODE = record("y", "radius", "slope", "zone")
+WHEEL_NODE_RECORD = record("y", "radius", "slope", "zone")
 """Node of the wheel's contour: position from the taping line (m), radius (m), slope and zone."""
-RAIL_KNOT = record("y", "c0", "c1", "c2", "c3")
+RAIL_KNOT_RECORD = record("y", "c0", "c1", "c2", "c3")
 """Knot of the rail's contour: position from the middle of the track (m) and the coefficients of the cubic beyond it."""
-TOUCH = record("depth", "n_y", "n_z", "x", "y", "z", "along", "across")
+TOUCH_RECORD = record("depth", "n_y", "n_z", "x", "y", "z", "along", "across")
 """Contact patch: penetration (m), normal into the rail, position from the wheelset's centre in the track's axes (m),
 curvatures A and B of the undeformed distance along and across (1/m)."""
 _SUMS = record("w2", "w3", "s1", "s2", "n_y", "n_z", "x", "y", "z", "radius")
 
 
-class Pose(NamedTuple):
+class WheelPose(NamedTuple):
     """Position of a wheelset: its centre relative to the track's middle (m), roll and yaw (rad)."""
 
     y: float
@@ -79,10 +79,10 @@ _LEAST_DEPTH_SQUARE = 1e-40
 
 @njit(cache=True, error_model="numpy")
 def profile_on_rail(wheel_side, wheelset_pose, laid_profile, contact_modulus, zone_touches):
-    """Fill the contact patches ``zone_touches``, TOUCH (zones,), of the right (side 1) or left (-1) wheel; a depth of 0 or
-    less is no contact.
+    """Fill the contact patches ``zone_touches``, TOUCH (zones,), of the right (side 1) or left (-1) wheel; a depth of 0
+    or less is no contact.
 
-    wheelset_pose : ``Pose``; laid_profile : ``LaidProfile``; contact_modulus : E* (Pa).
+    wheelset_pose : ``WheelPose``; laid_profile : ``LaidProfile``; contact_modulus : E* (Pa).
     """
     head = laid_profile.head[0]
     sums = np.zeros(int(head.zones), _SUMS)
@@ -120,8 +120,9 @@ def _pose_of_wheel(y, z, roll, yaw):
 
 @lean
 def _node_contact(wheel_node, wheel_pose, rail_head, rail_knots, knot_guess):
-    """Contact of the wheel circle through a wheel_node: depth along the rail's normal (m), position x, y, z from the centre
-    (m), slope of the rail, and the index of the knot."""
+    """Contact of the wheel circle through a wheel_node: depth along the rail's normal (m), position x, y, z from the
+    centre (m), slope of the rail, and the index of the knot.
+    """
     y, z, cr, sr, cy, sy, lead, level, steer = wheel_pose
     sine = min(1.0, max(-1.0, -wheel_node.slope * steer))
     cosine = math.sqrt(1.0 - sine * sine)
@@ -202,8 +203,8 @@ def settle_depths(zone_touches, contact_modulus):
     """Reduce the depths of one wheel's touches, TOUCH (zones,), by the elastic displacement that each touch's load
     causes at the others.
 
-    contact_modulus : E* (Pa). A load N displaces the surface of a half-space by N / (pi E* r) at a distance r. To r^2, the mean
-    square lengths of both patches are added.
+    contact_modulus : E* (Pa). A load N displaces the surface of a half-space by N / (pi E* r) at a distance r. To r^2,
+    the mean square lengths of both patches are added.
     """
     n = len(zone_touches)
     unloaded_depths, load, axis = np.empty(n), np.empty(n), np.empty(n)
@@ -227,8 +228,9 @@ def settle_depths(zone_touches, contact_modulus):
 
 @lean
 def _cosine_of_normals(first_touch, second_touch, squared_lengths):
-    """Ratio (1/m) of the cosine between the normals of two patches to their distance; ``squared_lengths`` (m^2) are added to
-    the squared distance."""
+    """Ratio (1/m) of the cosine between the normals of two patches to their distance; ``squared_lengths`` (m^2) are
+    added to the squared distance.
+    """
     squared_distance = (
         (first_touch.x - second_touch.x) ** 2
         + (first_touch.y - second_touch.y) ** 2

@@ -9,11 +9,11 @@ from scipy.optimize import root
 from models.contact.inputs import Array
 from models.core.errors import InputError, RunFailed
 from models.rail.equivalent_conicity import harmonic_linearised_conicity
-from models.rail.profile_contact import TOUCH, Pose, normal_force_and_axes
+from models.rail.profile_contact import TOUCH_RECORD, WheelPose, normal_force_and_axes
 from models.rail.wheel_forces import contact_points, count_of_patches, rails_of
 from models.rail.wheelset import Wheelset
 
-CHANGE_SIZE = 1e-5
+DIFFERENCE_SIZES = 1e-5
 """Scale (m, rad) of the changes of height and roll that the search makes."""
 LOAD_PRECISION = 1e-9
 """Relative precision of each wheel's load."""
@@ -22,7 +22,7 @@ SHIFT_COUNT = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Equilibrium:
+class StaticEquilibrium:
     """Static position of a wheelset: height z (m) and roll (rad), its contact patches, TOUCH (patches,), and their
     loads (patches,) in N, those of the right wheel first."""
 
@@ -41,7 +41,7 @@ class Equilibrium:
         return weighed / loads
 
 
-def equilibrium(wheelset: Wheelset, lateral_shift: float) -> Equilibrium:
+def static_equilibrium(wheelset: Wheelset, lateral_shift: float) -> StaticEquilibrium:
     """Static equilibrium of the wheelset at a lateral displacement (m), without yaw, with half the load on each wheel.
 
     Raises InputError for a wheelset without profiles or a displacement at which not both wheels touch.
@@ -51,15 +51,15 @@ def equilibrium(wheelset: Wheelset, lateral_shift: float) -> Equilibrium:
     rails, half = rails_of(wheelset), 0.5 * wheelset.load
     z, roll = wheelset.profiles.first_touch_pose(wheelset.radius, lateral_shift)
 
-    def pose(fall_and_roll: Array) -> Equilibrium:
-        touches = np.zeros(count_of_patches(rails.profile), TOUCH)
-        height_and_roll = (z + fall_and_roll[0] * CHANGE_SIZE, roll + fall_and_roll[1] * CHANGE_SIZE)
-        contact_points(Pose(lateral_shift, *height_and_roll, 0.0), rails, touches)
+    def pose(fall_and_roll: Array) -> StaticEquilibrium:
+        touches = np.zeros(count_of_patches(rails.profile), TOUCH_RECORD)
+        height_and_roll = (z + fall_and_roll[0] * DIFFERENCE_SIZES, roll + fall_and_roll[1] * DIFFERENCE_SIZES)
+        contact_points(WheelPose(lateral_shift, *height_and_roll, 0.0), rails, touches)
         modulus = rails.wheels["modulus"][0]
         loads = np.array(
             [normal_force_and_axes(touch.depth, touch.along, touch.across, modulus)[0] for touch in touches]
         )
-        return Equilibrium(*height_and_roll, touches, loads)
+        return StaticEquilibrium(*height_and_roll, touches, loads)
 
     def load_error(fall_and_roll: Array) -> Array:
         placed = pose(fall_and_roll)
@@ -78,6 +78,6 @@ def steering_cones(wheelset: Wheelset, amplitude: float) -> Wheelset:
     ``models.rail.linear``."""
     shifts = np.linspace(0.0, amplitude, SHIFT_COUNT + 1)
     differences = np.array(
-        [0.0, *(-np.diff(equilibrium(wheelset, float(shift)).rolling_radii())[0] for shift in shifts[1:])]
+        [0.0, *(-np.diff(static_equilibrium(wheelset, float(shift)).rolling_radii())[0] for shift in shifts[1:])]
     )
     return wheelset.coned(harmonic_linearised_conicity(shifts, differences, amplitude)).changed(profiles=None)

@@ -60,7 +60,8 @@ class RollingRadiusTable:
         back = np.flatnonzero(steps < 0.0)
         if back.size:
             i = int(back[0]) + 1
-            allowed = f"comes after {displacements[i - 1]:g}: displacements must rise (or fall) from row to row; sort the table"
+            before = f"comes after {displacements[i - 1]:g}"
+            allowed = f"{before}: displacements must rise (or fall) from row to row; sort the table"
             raise InputError(self.source, f"displacement, row {i + 1}", float(displacements[i]), allowed)
         thrice = np.flatnonzero((steps[1:] == 0.0) & (steps[:-1] == 0.0))
         if thrice.size:
@@ -80,7 +81,9 @@ class RollingRadiusTable:
         return float(self.displacements[0]), float(self.displacements[-1])
 
     def section(self, lowest_displacement: float, highest_displacement: float) -> tuple[Array, Array]:
-        """Displacements and differences of the section of the table from ``lowest_displacement`` to ``highest_displacement``, including both ends."""
+        """Displacements and differences of the section of the table from ``lowest_displacement`` to
+        ``highest_displacement``, including both ends.
+        """
         y, dr = self.displacements, self.differences
         first_row, last_row = (
             int(np.searchsorted(y, lowest_displacement, "right")),

@@ -32,9 +32,9 @@ from models.core.errors import InputError
 from models.machine.compiled import inlined, lean, njit
 from models.machine.records import record
 from models.machine.stack import array, doubles
-from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
-from models.rail.laid_profiles import laid_profile, no_profile
-from models.rail.profile_contact import TOUCH, LaidProfile, Pose, normal_force_and_axes, profile_on_rail
+from models.rail.contact_point import LEFT, RIGHT, ConicalWheel, cone_on_rail
+from models.rail.laid_profiles import empty_profile, laid_profile
+from models.rail.profile_contact import TOUCH_RECORD, LaidProfile, WheelPose, normal_force_and_axes, profile_on_rail
 from models.rail.wheelset import Wheelset
 
 REGULARISED_SPEED = 0.1
@@ -42,12 +42,13 @@ REGULARISED_SPEED = 0.1
 LINEAR, FASTSIM = 0, 1
 LAW_NUMBERS = {"linear": LINEAR, "fastsim": FASTSIM}
 LEAST_CELLS, MOST_CELLS = 3, 200
-WHEELS = record(
+WHEELS_RECORD = record(
     "radius", "half_gauge", "conicity", "head", "modulus", "shear", "nu", "friction", "damping", "clearance", "flange"
 )
-"""Numbers of both wheel-rail contacts (SI): those of ``Cone``; modulus is E*, shear is G, flange is the stiffness of
-the flange's spring."""
-REPORT = record(
+"""Numbers of both wheel-rail contacts (SI): those of ``ConicalWheel``; modulus is E*, shear is G, flange is the
+stiffness of the flange's spring.
+"""
+REPORT_RECORD = record(
     "load",
     "fx",
     "fy",
@@ -71,10 +72,10 @@ REPORT = record(
 creepages and spin (1/m), semi-axes (m), penetration (m), power of the creep forces (W), angle of the rail's surface
 (rad), position from the wheelset's centre in the track's axes (m), lateral force of a cone's flange (N), powers of the
 elastic normal force and flange and of the contact's damping (W)."""
-MOTION = record("vx", "vy", "aside", "turn", "rate", "elastic", "push", "patch")
+MOTION_RECORD = record("vx", "vy", "aside", "turn", "rate", "elastic", "push", "patch")
 """Motion of a patch in contact: that of ``PatchMotion``, elastic normal force (N), lateral force of a cone's flange
 (N), index of the patch."""
-WHEELSET = np.dtype(
+WHEELSET_RECORD = np.dtype(
     (np.record, np.dtype([(name, np.float64, (3,)) for name in ("velocity", "turning", "force", "moment")], align=True))
 )
 """Motion and resultant of a wheelset in the track's axes: velocity of its centre, the speed of travel included (m/s);
@@ -82,9 +83,9 @@ angular velocity, spin about the axle included (rad/s); force (N) and moment abo
 BLENDED_BRISTLES, SECOND_ORDER_MARCH = FLEXIBILITY_KINDS["blended"], MARCH_KINDS["second-order"]
 
 
-class Rails(NamedTuple):
+class RailsAndWheels(NamedTuple):
     """Rails under the wheels and their creep law: WHEELS (1,); profiles, without a node for cones; tables of FASTSIM's
-    grid (``Grid``); law : LINEAR or FASTSIM."""
+    grid (``FastsimGrid``); law : LINEAR or FASTSIM."""
 
     wheels: Array
     profile: LaidProfile
@@ -94,7 +95,7 @@ class Rails(NamedTuple):
     law: int
 
 
-class Workspace(NamedTuple):
+class WheelForcesWorkspace(NamedTuple):
     """Arrays for intermediate values, overwritten in every call, because allocating one takes as long as a wheel's
     kinematics.
 
@@ -107,10 +108,10 @@ class Workspace(NamedTuple):
     contacts: Array
     motion: Array
     directed: Array
-    fill_contact_forces: Array
+    forces: Array
 
 
-class PatchPlace(NamedTuple):
+class PatchPoint(NamedTuple):
     """Position of a contact patch: normal into the rail, and coordinates from the wheelset's centre in the track's axes
     (m)."""
 
@@ -132,7 +133,7 @@ class PatchMotion(NamedTuple):
     rate: float
 
 
-class PatchNormalContact(NamedTuple):
+class PatchNormalForce(NamedTuple):
     """Normal contact of a patch: penetration and semi-axes (m); elastic normal force, normal force with damping, and
     lateral force of a cone's flange (N)."""
 
@@ -144,21 +145,21 @@ class PatchNormalContact(NamedTuple):
     push: float
 
 
-def rails_of(wheelset: Wheelset, creep_law: str = "linear", cell_count: int = LEAST_CELLS) -> Rails:
+def rails_of(wheelset: Wheelset, creep_law: str = "linear", cell_count: int = LEAST_CELLS) -> RailsAndWheels:
     """Rails under a wheelset, with FASTSIM's grid for its contact ellipse at rest (see ``fastsim_grid``)."""
     if isinstance(cell_count, bool) or not isinstance(cell_count, int) or not LEAST_CELLS <= cell_count <= MOST_CELLS:
         raise InputError("", "cells", cell_count, f"must be a whole number from {LEAST_CELLS} to {MOST_CELLS}")
     w, pair, ellipse = wheelset, wheelset.material_pair, wheelset.ellipse
     shape = w.radius, w.half_gauge, w.conicity, w.head_radius, pair.modulus, pair.G, pair.nu
-    wheels = np.array([(*shape, w.friction, w.contact_damping, w.flange_clearance, w.flange_stiffness)], WHEELS)
-    profile = laid_profile(w.profiles, w.radius) if w.profiles else no_profile()
+    wheels = np.array([(*shape, w.friction, w.contact_damping, w.flange_clearance, w.flange_stiffness)], WHEELS_RECORD)
+    profile = laid_profile(w.profiles, w.radius) if w.profiles else empty_profile()
     net = ellipse_grid(cell_count, int(count_of_strips(np.asarray(ellipse.a / ellipse.b), cell_count)), "intermediate")
     laid = LaidProfile(*(values.copy() for values in profile))  # of one type for numba, kept and made at a pointer
-    return Rails(wheels, laid, net.strips, net.cells, net.middle, LAW_NUMBERS[creep_law])
+    return RailsAndWheels(wheels, laid, net.strips, net.cells, net.middle, LAW_NUMBERS[creep_law])
 
 
-def plain_rails(rails_and_wheels: Rails) -> tuple[Any, ...]:
-    """``Rails`` as plain tuples, which Python passes to compiled functions faster."""
+def plain_rails(rails_and_wheels: RailsAndWheels) -> tuple[Any, ...]:
+    """``RailsAndWheels`` as plain tuples, which Python passes to compiled functions faster."""
     return tuple(
         tuple(rail_part) if isinstance(rail_part, LaidProfile) else rail_part for rail_part in rails_and_wheels
     )
@@ -166,9 +167,9 @@ def plain_rails(rails_and_wheels: Rails) -> tuple[Any, ...]:
 
 @inlined
 def rails_from_tuples(plain_tuples):
-    """``Rails`` made from the plain tuples of ``plain_rails``."""
+    """``RailsAndWheels`` made from the plain tuples of ``plain_rails``."""
     wheels, (head, nodes, knots), strips, cells, middle, law = plain_tuples
-    return Rails(wheels, LaidProfile(head, nodes, knots), strips, cells, middle, law)
+    return RailsAndWheels(wheels, LaidProfile(head, nodes, knots), strips, cells, middle, law)
 
 
 @lean
@@ -179,13 +180,13 @@ def count_of_patches(profile):
 
 @njit(cache=True, error_model="numpy")
 def workspace_for(profile):
-    """``Workspace`` for the contacts of a wheelset on these profiles (or cones)."""
+    """``WheelForcesWorkspace`` for the contacts of a wheelset on these profiles (or cones)."""
     n = count_of_patches(profile)
-    return Workspace(
-        np.empty(1, WHEELSET),
-        np.empty(n, TOUCH),
+    return WheelForcesWorkspace(
+        np.empty(1, WHEELSET_RECORD),
+        np.empty(n, TOUCH_RECORD),
         np.empty(n, CONTACT),
-        np.empty(n, MOTION),
+        np.empty(n, MOTION_RECORD),
         np.empty(n, FORCES),
         np.empty(n, FORCES),
     )
@@ -193,15 +194,16 @@ def workspace_for(profile):
 
 @lean
 def contact_points(wheelset_pose, rails_and_wheels, zone_touches):
-    """Fill the contact patches ``zone_touches``, TOUCH (patches,), the right wheel's first; patches far from contact get no
-    normal."""
+    """Fill the contact patches ``zone_touches``, TOUCH (patches,), the right wheel's first; patches far from contact
+    get no normal.
+    """
     per_wheel, wheels = len(zone_touches) // 2, rails_and_wheels.wheels[0]
     for k in range(2):
         side, of_side = RIGHT if k == 0 else LEFT, zone_touches[k * per_wheel : (k + 1) * per_wheel]
         if rails_and_wheels.profile.nodes.size > 0:
             profile_on_rail(side, wheelset_pose, rails_and_wheels.profile, wheels.modulus, of_side)
             continue
-        cone = Cone(wheels.radius, wheels.half_gauge, wheels.conicity, wheels.head)
+        cone = ConicalWheel(wheels.radius, wheels.half_gauge, wheels.conicity, wheels.head)
         depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, wheelset_pose, cone)
         touch = of_side[0]
         touch.depth, touch.n_y, touch.n_z, touch.x, touch.y, touch.z = depth, n_y, n_z, cx, cy, cz
@@ -212,8 +214,8 @@ def contact_points(wheelset_pose, rails_and_wheels, zone_touches):
 def supported_force(fall, rails_and_wheels):
     """Vertical part (N) of the elastic normal forces, with the wheelset's centre at height z (m) in the middle of the
     track."""
-    touches, force_sum = np.zeros(count_of_patches(rails_and_wheels.profile), TOUCH), 0.0
-    contact_points(Pose(0.0, fall, 0.0, 0.0), rails_and_wheels, touches)
+    touches, force_sum = np.zeros(count_of_patches(rails_and_wheels.profile), TOUCH_RECORD), 0.0
+    contact_points(WheelPose(0.0, fall, 0.0, 0.0), rails_and_wheels, touches)
     for k in range(len(touches)):
         touch = touches[k]
         force_sum += (
@@ -270,7 +272,8 @@ def _fill_one_direction(direction_sign, patch_contacts, creep_slips, speed, rail
 
 @inlined
 def fill_creep_forces(patch_contacts, creep_slips, speed, rails_and_wheels, contact_workspace):
-    """Fill the creep forces fx, fy, mz in ``contact_workspace`` for contacts (CONTACT) from their sliding motion (MOTION).
+    """Fill the creep forces fx, fy, mz in ``contact_workspace`` for contacts (CONTACT) from their sliding motion
+    (MOTION).
 
     Near standstill they are a mixture of forward and backward rolling. The creepages are written into the contacts; for
     a wheel that rolls backwards those of its mirror image.
@@ -295,32 +298,35 @@ def fill_creep_forces(patch_contacts, creep_slips, speed, rails_and_wheels, cont
 
 
 @inlined
-def wheel_forces(wheelset_pose, rails_and_wheels, contact_report, contact_workspace):
+def fill_wheel_forces(wheelset_pose, rails_and_wheels, contact_report, contact_workspace):
     """Add the forces and moments of both rails on the wheelset to its resultants.
 
-    wheelset_pose : ``Pose``; contact_report : REPORT (patches,), filled, or of no rows where nobody asks; contact_workspace : ``Workspace``, its
-    wheelset given in, all else written over.
+    wheelset_pose : ``WheelPose``; contact_report : REPORT (patches,), filled, or of no rows where nobody asks;
+    contact_workspace : ``WheelForcesWorkspace``, its wheelset given in, all else written over.
     """
     if (
         rails_and_wheels.law == LINEAR
         and rails_and_wheels.profile.nodes.size == 0
         and contact_workspace.wheelset[0].velocity[0] >= REGULARISED_SPEED
     ):
-        _linear_cones(wheelset_pose, rails_and_wheels.wheels[0], contact_workspace.wheelset[0], contact_report)
+        _fill_linear_forces_of_cones(
+            wheelset_pose, rails_and_wheels.wheels[0], contact_workspace.wheelset[0], contact_report
+        )
     else:
-        patch_by_patch(wheelset_pose, rails_and_wheels, contact_report, contact_workspace)
+        fill_forces_patch_by_patch(wheelset_pose, rails_and_wheels, contact_report, contact_workspace)
 
 
 @lean
-def _linear_cones(wheelset_pose, wheels, wheelset, contact_report):
-    """Add the forces of cones with the linear creep law that roll forwards, as ``patch_by_patch`` does but without
-    storing intermediate values."""
-    cone = Cone(wheels.radius, wheels.half_gauge, wheels.conicity, wheels.head)  # read once, as what follows
+def _fill_linear_forces_of_cones(wheelset_pose, wheels, wheelset, contact_report):
+    """Add the forces of cones with the linear creep law that roll forwards, as ``fill_forces_patch_by_patch`` does but
+    without storing intermediate values.
+    """
+    cone = ConicalWheel(wheels.radius, wheels.half_gauge, wheels.conicity, wheels.head)  # read once, as what follows
     speed, modulus, shear, poisson = wheelset.velocity[0], wheels.modulus, wheels.shear, wheels.nu
     damping, velocity, turning = wheels.damping, wheelset.velocity, wheelset.turning
     for side in (RIGHT, LEFT):
         depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, wheelset_pose, cone)
-        patch_point = PatchPlace(n_y, n_z, cx, cy, cz)
+        patch_point = PatchPoint(n_y, n_z, cx, cy, cz)
         motion = _patch_motion(patch_point, velocity, turning)
         elastic, a, b = normal_force_and_axes(
             depth, _longitudinal_curvature(rolling, cone.conicity), 0.5 / cone.head, modulus
@@ -328,16 +334,16 @@ def _linear_cones(wheelset_pose, wheels, wheelset, contact_report):
         slip = motion.vx / speed, motion.aside / speed, motion.turn / speed
         creeping = _linear_forces(a, b, slip, shear, poisson)
         load = elastic * max(0.0, 1.0 + damping * motion.rate)
-        press = PatchNormalContact(depth, a, b, elastic, load, _flange_force(side, wheelset_pose.y, wheels))
+        press = PatchNormalForce(depth, a, b, elastic, load, _flange_force(side, wheelset_pose.y, wheels))
         _add_patch_forces(patch_point, press, creeping, wheelset.force, wheelset.moment)
         if len(contact_report) > 0:
             _fill_report(patch_point, motion, press, creeping, speed, contact_report[0 if side == RIGHT else 1])
 
 
 @lean
-def patch_by_patch(wheelset_pose, rails_and_wheels, contact_report, contact_workspace):
+def fill_forces_patch_by_patch(wheelset_pose, rails_and_wheels, contact_report, contact_workspace):
     """Add the forces of both rails for all kinds of patches, creep laws and directions of rolling; see
-    ``wheel_forces``."""
+    ``fill_wheel_forces``."""
     touches, wheels, wheelset, n, count = (
         contact_workspace.touches,
         rails_and_wheels.wheels[0],
@@ -366,12 +372,14 @@ def patch_by_patch(wheelset_pose, rails_and_wheels, contact_report, contact_work
     for i in range(count):
         contact, m, answer = contact_workspace.contacts[i], contact_workspace.motion[i], contact_workspace.forces[i]
         touch = touches[int(m.patch)]
-        press = PatchNormalContact(touch.depth, contact.a, contact.b, m.elastic, contact.load, m.push)
+        press = PatchNormalForce(touch.depth, contact.a, contact.b, m.elastic, contact.load, m.push)
         creeping = answer.fx, answer.fy, answer.mz
-        _add_patch_forces(_patch_place(touch), press, creeping, wheelset.force, wheelset.moment)
+        _add_patch_forces(_patch_point_of_touch(touch), press, creeping, wheelset.force, wheelset.moment)
         if len(contact_report) > 0:
             motion = PatchMotion(m.vx, m.vy, m.aside, m.turn, m.rate)
-            _fill_report(_patch_place(touch), motion, press, creeping, velocity[0], contact_report[int(m.patch)])
+            _fill_report(
+                _patch_point_of_touch(touch), motion, press, creeping, velocity[0], contact_report[int(m.patch)]
+            )
 
 
 @inlined
@@ -387,9 +395,9 @@ def _flange_force(wheel_side, lateral_position, wheels):
 
 
 @inlined
-def _patch_place(zone_touch):
-    """``PatchPlace`` of a touching point."""
-    return PatchPlace(zone_touch.n_y, zone_touch.n_z, zone_touch.x, zone_touch.y, zone_touch.z)
+def _patch_point_of_touch(zone_touch):
+    """``PatchPoint`` of a touching point."""
+    return PatchPoint(zone_touch.n_y, zone_touch.n_z, zone_touch.x, zone_touch.y, zone_touch.z)
 
 
 @inlined
@@ -407,7 +415,7 @@ def _patch_motion(patch_point, velocity, angular_velocity):
 @inlined
 def _fill_contact(zone_touch, wheelset, wheels, flange_push, patch_contact, patch_motion):
     """Fill the contact of one patch for the creep law and its patch_motion: kinematics and normal force."""
-    moving = _patch_motion(_patch_place(zone_touch), wheelset.velocity, wheelset.turning)
+    moving = _patch_motion(_patch_point_of_touch(zone_touch), wheelset.velocity, wheelset.turning)
     elastic, a, b = normal_force_and_axes(zone_touch.depth, zone_touch.along, zone_touch.across, wheels.modulus)
     patch_motion.vx, patch_motion.vy, patch_motion.aside, patch_motion.turn, patch_motion.rate = moving
     patch_motion.elastic, patch_motion.push = elastic, flange_push

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from models.contact.hertz import HertzContact, by_load
 from models.contact.material import STEEL, Material, MaterialPair
 from models.core.strict import Strict, input_error_from_faults, quantity
-from models.rail.laid_profiles import Profiles
+from models.rail.laid_profiles import CrossSections
 
 GRAVITY = 9.81
 """Acceleration of gravity (m/s^2)."""
@@ -44,7 +44,7 @@ class Wheelset(Strict):
     flange_stiffness: float = quantity("N/m", "lateral, of a flange on its rail", zero=True)
     contact_damping: float = quantity("s/m", "share of the elastic normal force by the speed of approach", zero=True)
     material: Material = STEEL
-    profiles: Profiles | None = Field(default=None, description="cross-sections in place of cones and round heads")
+    profiles: CrossSections | None = Field(default=None, description="cross-sections in place of cones and round heads")
 
     def __init__(self, **parameters: Any) -> None:
         try:

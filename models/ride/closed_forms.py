@@ -28,7 +28,9 @@ class QuarterCar:
         return self.m_s + self.m_u
 
     def body_acceleration_variance(self, noise_intensity: float, corner_wavenumber: float = 0.0) -> float:
-        """Variance of the body's acceleration, m^2/s^4; noise_intensity : intensity of the road's white noise, m^2/s."""
+        """Variance of the body's acceleration, m^2/s^4; noise_intensity : intensity of the road's white noise,
+        m^2/s.
+        """
         s, u, k, c, t, w = self.m_s, self.m_u, self.k, self.c, self.k_t, corner_wavenumber
         top = c**3 * t * w + c**2 * k * t + c**2 * t * s * w**2 + c * k**2 * self.mass * w + k**3 * self.mass
         return noise_intensity * t / (2 * c * s**2) * (top + k**2 * s * u * w**2) / self._common(w)
@@ -75,8 +77,8 @@ def half_car_acceleration(
     similar quarter cars; the front axle is a (m) ahead of the centre, the rear one b behind.
 
     It splits if its pitch inertia is m a b, and if springs, dampers, tyres and wheels of the axles are in the ratio of
-    their shares of the mass, front b / (a + b), rear a / (a + b). ``quarter_car`` is the quarter car of both, up to this
-    factor.
+    their shares of the mass, front b / (a + b), rear a / (a + b). ``quarter_car`` is the quarter car of both, up to
+    this factor.
     """
     base = front_distance + rear_distance
     at_axle = quarter_car.body_acceleration_variance(noise_intensity)
@@ -86,11 +88,12 @@ def half_car_acceleration(
     ) / base**2
 
 
-def split_half_car(
+def quarter_cars_of_half_car(
     quarter_car: QuarterCar, front_distance: float, rear_distance: float
 ) -> tuple[QuarterCar, QuarterCar, float]:
-    """Front and rear quarter car of a half car that splits: 2 b / (a + b) and 2 a / (a + b) times ``quarter_car``; and its
-    pitch inertia in kg m^2."""
+    """Front and rear quarter car of a half car that splits: 2 b / (a + b) and 2 a / (a + b) times ``quarter_car``; and
+    its pitch inertia in kg m^2.
+    """
     front, rear = (
         QuarterCar(*(2 * share / (front_distance + rear_distance) * value for value in vars(quarter_car).values()))
         for share in (rear_distance, front_distance)

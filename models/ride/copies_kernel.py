@@ -14,7 +14,7 @@ COPIES_SIDE_BY_SIDE = 64
 long."""
 
 
-class Curves(NamedTuple):
+class ForceCurves(NamedTuple):
     """Piecewise linear force curves of s springs: forces (N) over travel (m) or rate (m/s), as offset and first slope
     (s,), and changes of slope, bends (s, k), at k corners (s, k); unused bends are 0."""
 
@@ -48,8 +48,8 @@ class ForceLaws(NamedTuple):
     travel_rows: np.ndarray
     acceleration_rows: np.ndarray
     output_rows: np.ndarray
-    by_travel: Curves
-    by_rate: Curves
+    by_travel: ForceCurves
+    by_rate: ForceCurves
     friction: np.ndarray
     friction_rate: np.ndarray
     tyres: PushingTyres
@@ -105,7 +105,7 @@ def fill_missing_tyre_force(
 
 
 @lean
-def fill_rates(vehicle_states, road_heights, force_laws, nonlinear_forces, state_rate, workspace):
+def fill_state_rates(vehicle_states, road_heights, force_laws, nonlinear_forces, state_rate, workspace):
     """Fill the time derivatives (2 n, copies) of the states (positions, then rates) on roads (2 w, copies), and the
     nonlinear forces (s + u, copies) in N; workspace (2, copies) is overwritten."""
     n, w, springs = vehicle_states.shape[0] // 2, road_heights.shape[0], force_laws.travel_rows.shape[0]
@@ -151,7 +151,7 @@ def fill_output(output_index, vehicle_states, road_heights, state_rates, nonline
 
 
 @lean
-def add_powers(output_values, power_sums, output_index, first_copy):
+def add_output_powers(output_values, power_sums, output_index, first_copy):
     """Add the first four powers of an output (copies,) to their sums, in columns from copy ``first_copy`` on."""
     for c in range(output_values.size):
         square = output_values[c] * output_values[c]
@@ -170,7 +170,7 @@ def advance_states(vehicle_states, duration, state_rates, next_states):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def march(vehicle_states, road_paths, time_step, first_counted_step, counting_stride, force_laws, power_sums):
+def march_copies(vehicle_states, road_paths, time_step, first_counted_step, counting_stride, force_laws, power_sums):
     """Integrate all copies by the classical Runge-Kutta method with a fixed step (s), and sum up powers of their
     outputs.
 
@@ -190,17 +190,17 @@ def march(vehicle_states, road_paths, time_step, first_counted_step, counting_st
         forces = force_laws.travel_rows.shape[0] + force_laws.tyres.wheel.size
         force, room = np.empty((forces, x.shape[1])), np.empty((2, x.shape[1]))
         for i in range(road.shape[0] // 2):
-            fill_rates(x, road[2 * i], force_laws, force, k1, room)
+            fill_state_rates(x, road[2 * i], force_laws, force, k1, room)
             if i >= first_counted_step and (i - first_counted_step) % counting_stride == 0:
                 for p in range(force_laws.output_rows.shape[0]):
                     fill_output(p, x, road[2 * i], k1, force, force_laws, room[0])
-                    add_powers(room[0], power_sums, p, copy)
+                    add_output_powers(room[0], power_sums, p, copy)
             advance_states(x, 0.5 * time_step, k1, moved_states)
-            fill_rates(moved_states, road[2 * i + 1], force_laws, force, k2, room)
+            fill_state_rates(moved_states, road[2 * i + 1], force_laws, force, k2, room)
             advance_states(x, 0.5 * time_step, k2, moved_states)
-            fill_rates(moved_states, road[2 * i + 1], force_laws, force, k3, room)
+            fill_state_rates(moved_states, road[2 * i + 1], force_laws, force, k3, room)
             advance_states(x, time_step, k3, moved_states)
-            fill_rates(moved_states, road[2 * i + 2], force_laws, force, k4, room)
+            fill_state_rates(moved_states, road[2 * i + 2], force_laws, force, k4, room)
             for j in range(x.shape[0]):
                 for c in range(x.shape[1]):
                     x[j, c] += time_step / 6.0 * (k1[j, c] + 2.0 * (k2[j, c] + k3[j, c]) + k4[j, c])

@@ -19,7 +19,14 @@ from scipy.linalg import expm
 
 from models.core.errors import InputError
 from models.ride.excited import DelayedSystem
-from models.ride.marginal import MATRIX_ACCURACY, ZERO_MARGIN, Growth, MarginalParts, split_marginal, variance_growth
+from models.ride.marginal import (
+    MATRIX_ACCURACY,
+    ZERO_MARGIN,
+    MarginalParts,
+    VarianceGrowth,
+    split_marginal,
+    variance_growth,
+)
 
 FINITE, INFINITE, DIFFUSING = "finite", "infinite", "diffusing"
 """Status of an output's variance: finite; infinite; growing without bound over time (diffusing)."""
@@ -57,9 +64,9 @@ def stationary_covariance(
 ) -> StationaryCovariance:
     """Stationary covariance of a system whose axles meet unit white noise one after the other.
 
-    ``matrix_accuracy`` of the system's matrices, relative: what is smaller counts as zero, so that free motions are found.
-    Raises Unstable, with growth rate and frequency, if the system leaves its equilibrium on its own, and InputError
-    where a variance cannot be told to UNCERTAINTY_LIMIT of itself.
+    ``matrix_accuracy`` of the system's matrices, relative: what is smaller counts as zero, so that free motions are
+    found. Raises Unstable, with growth rate and frequency, if the system leaves its equilibrium on its own, and
+    InputError where a variance cannot be told to UNCERTAINTY_LIMIT of itself.
     """
     met = noise_arrivals(delayed_system)
     split = split_marginal(delayed_system.A, matrix_accuracy)
@@ -82,7 +89,7 @@ def stationary_covariance(
     error = np.divide(abs(change), variance, out=np.zeros(len(variance)), where=finite & (variance > 0))
     error += split.neglected_rate_ratio
     if (error[finite] > UNCERTAINTY_LIMIT).any():
-        _refuse(delayed_system.names[int(np.where(finite, error, 0.0).argmax())], float(error[finite].max()))
+        _refuse_imprecise(delayed_system.names[int(np.where(finite, error, 0.0).argmax())], float(error[finite].max()))
     V, P = V.astype(float), P.astype(float)
     return StationaryCovariance(
         delayed_system.names,
@@ -134,18 +141,18 @@ def noise_arrivals(delayed_system: DelayedSystem) -> NoiseArrivals:
     return NoiseArrivals(B, D, delays, False)
 
 
-Propagator = Callable[[float, np.ndarray], np.ndarray]
+MatrixExponential = Callable[[float, np.ndarray], np.ndarray]
 """Function that returns e^(A t) B of a time t (s) and B (n, k)."""
 
 
 def _responses_before_arrival(
-    A: np.ndarray, noise_arrivals_at_axles: NoiseArrivals, matrix_exponential: Propagator | None = None
+    A: np.ndarray, noise_arrivals_at_axles: NoiseArrivals, matrix_exponential: MatrixExponential | None = None
 ) -> list[np.ndarray]:
     """State responses F_j to noise that earlier axles have met, just before axle j meets the same noise; zero where no
     axle has met it before."""
     if matrix_exponential is None:
 
-        def propagator(time: float, B: np.ndarray) -> np.ndarray:
+        def matrix_exponential(time: float, B: np.ndarray) -> np.ndarray:
             return np.asarray(expm(A * time) @ B)
 
     responses = [np.zeros_like(noise_arrivals_at_axles.B[0])]
@@ -161,20 +168,20 @@ def _responses_before_arrival(
 
 
 def noise_intensity_of_system(
-    delayed_system: DelayedSystem, matrix_exponential: Propagator | None = None
+    delayed_system: DelayedSystem, matrix_exponential: MatrixExponential | None = None
 ) -> np.ndarray:
     """Noise intensity matrix Q of a system (see ``noise_intensity``), in double precision."""
     return noise_intensity(delayed_system.A, noise_arrivals(delayed_system), matrix_exponential).astype(float)
 
 
 def noise_intensity(
-    A: np.ndarray, noise_arrivals_at_axles: NoiseArrivals, matrix_exponential: Propagator | None = None
+    A: np.ndarray, noise_arrivals_at_axles: NoiseArrivals, matrix_exponential: MatrixExponential | None = None
 ) -> np.ndarray:
     """Noise intensity matrix Q (n, n) in A P + P A' + Q = 0: increase of the covariance per second by the noise at all
     axles, with exact delays.
 
-    ``matrix_exponential`` stands for the matrix exponential where it is known. Squares in extended precision: where two axles'
-    noises cancel in an output, so do the squares of their rounding.
+    ``matrix_exponential`` stands for the matrix exponential where it is known. Squares in extended precision: where two
+    axles' noises cancel in an output, so do the squares of their rounding.
     """
     earlier_responses, hit_inputs = (
         [matrix.astype(np.longdouble) for matrix in matrices]
@@ -224,7 +231,7 @@ UNCERTAINTY_LIMIT = 1e-6
 """Relative error of a variance above which no variance is given."""
 
 
-def _refuse(quantity_name: str, error: float) -> None:
+def _refuse_imprecise(quantity_name: str, error: float) -> None:
     raise InputError(
         "",
         f"output {quantity_name}",
@@ -309,7 +316,7 @@ def variance_verdicts(
     D: Sequence[np.ndarray],
     variance: np.ndarray,
     rounding_floor: np.ndarray,
-    growth_of_variance: Growth,
+    growth_of_variance: VarianceGrowth,
     fastest_rate: float,
     matrix_accuracy: float,
     marginal_parts: MarginalParts | None = None,
@@ -336,14 +343,14 @@ def _variance_verdict(
         deviation_after = np.sqrt(growth_rate * 100.0**growth_power)
         return DIFFUSING, (
             f"the road drives a motion that nothing pulls back and that this output sees: its variance "
-            f"grows as {growth_rate:.4g} t^{growth_power} (t in s), a standard deviation of {deviation_after:.3g} after "
-            "100 s"
+            f"grows as {growth_rate:.4g} t^{growth_power} (t in s), a standard deviation of {deviation_after:.3g} "
+            "after 100 s"
         )
     if marginal_parts is None or not marginal_parts.count_of_marginal_states:
         return FINITE, "every motion dies out"
     return FINITE, (
-        f"{marginal_parts.count_of_marginal_states} states are of motions that nothing pulls back, but this output does not see "
-        "them, or sees only what the road does not drive in the long run"
+        f"{marginal_parts.count_of_marginal_states} states are of motions that nothing pulls back, but this output "
+        "does not see them, or sees only what the road does not drive in the long run"
     )
 
 

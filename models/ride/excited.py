@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.core.errors import InputError
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.vehicles.linear_vehicle import LinearVehicle, OutputRows
 
 
@@ -37,7 +37,7 @@ class DelayedSystem:
     independent: bool = False
 
 
-def vehicle_with_road(linear_vehicle: LinearVehicle, road_excitation: Excitation, speed: float) -> DelayedSystem:
+def vehicle_with_road(linear_vehicle: LinearVehicle, road_excitation: RoadExcitation, speed: float) -> DelayedSystem:
     """State-space model of a vehicle with its road filters, at a constant speed (m/s, above 0).
 
     State (q, q', f of each axle). In time a filter reads f' = v F f + sqrt(v) G w; the height's rate is
@@ -72,12 +72,12 @@ def vehicle_with_road(linear_vehicle: LinearVehicle, road_excitation: Excitation
     for filter_slice, H, noise in zip(filters, road_excitation.heights, B, strict=True):
         C[:, filter_slice] += read.road_factors @ H + speed * read.road_rate_factors @ H @ road_excitation.F
         D.append(read.acceleration_factors @ noise[n : 2 * n] + root * read.road_rate_factors @ H @ road_excitation.G)
-    return _system(linear_vehicle, road_excitation, speed, A, B, C, D)
+    return _delayed_system_at_speed(linear_vehicle, road_excitation, speed, A, B, C, D)
 
 
-def _system(
+def _delayed_system_at_speed(
     linear_vehicle: LinearVehicle,
-    road_excitation: Excitation,
+    road_excitation: RoadExcitation,
     speed: float,
     A: np.ndarray,
     B: Iterable[np.ndarray],
@@ -98,7 +98,7 @@ def has_singular_mass(mass: np.ndarray) -> bool:
 
 
 @dataclass(frozen=True)
-class VehicleStates:
+class VehicleStateForm:
     """State-space form of a vehicle under generalised forces g (n,): x' = A x + B g, coordinates q = Q x + direct g.
 
     The state is (a, a', b). A (x, x), B (x, n), Q (n, x); direct (n, n) is the compliance of what only springs hold.
@@ -113,8 +113,8 @@ class VehicleStates:
     integrated_part: np.ndarray
 
 
-def vehicle_states(linear_vehicle: LinearVehicle) -> VehicleStates:
-    """``VehicleStates`` of a vehicle whose mass matrix may be singular. Raises InputError where a massless body has
+def vehicle_states(linear_vehicle: LinearVehicle) -> VehicleStateForm:
+    """``VehicleStateForm`` of a vehicle whose mass matrix may be singular. Raises InputError where a massless body has
     neither spring nor damper."""
     Y, Z = _range_and_kernel(linear_vehicle.mass)
     V, E = (Z @ basis for basis in _range_and_kernel(Z.T @ linear_vehicle.damping @ Z))
@@ -136,11 +136,11 @@ def vehicle_states(linear_vehicle: LinearVehicle) -> VehicleStates:
     inert = _solved_for(Y.T @ linear_vehicle.mass @ Y, Y.T @ (force - linear_vehicle.damping @ V @ slow))
     A, B = np.split(np.vstack([np.hstack([v_a, np.zeros((a, n))]), inert, slow]), [2 * a + b], axis=1)
     back = np.linalg.inv(np.hstack([Y, V, E]))
-    return VehicleStates(A, B, q, direct, back[:a], back[a : a + b])
+    return VehicleStateForm(A, B, q, direct, back[:a], back[a : a + b])
 
 
 def first_order_system(
-    linear_vehicle: LinearVehicle, vehicle_form: VehicleStates, road_excitation: Excitation, speed: float
+    linear_vehicle: LinearVehicle, vehicle_form: VehicleStateForm, road_excitation: RoadExcitation, speed: float
 ) -> tuple[DelayedSystem, np.ndarray]:
     """State-space model with the state (a, a', b, f) of a vehicle whose mass matrix may be singular, and the matrix (n,
     x) from this state to the vehicle's coordinates.
@@ -167,7 +167,9 @@ def first_order_system(
     v = q @ A
     C = read.displacement_factors @ q + read.rate_factors @ v + read.acceleration_factors @ v @ A
     C[:, x:] += read.road_factors @ heights + read.road_rate_factors @ rate
-    return _system(linear_vehicle, road_excitation, speed, A, B, C, _direct_transmission(read, q, v, B, noise)), q
+    return _delayed_system_at_speed(
+        linear_vehicle, road_excitation, speed, A, B, C, _direct_transmission(read, q, v, B, noise)
+    ), q
 
 
 def _direct_transmission(

@@ -42,7 +42,7 @@ def write_exports(delayed_system: DelayedSystem, covariance: StationaryCovarianc
     return paths
 
 
-def state_space(delayed_system: DelayedSystem) -> "control.StateSpace":
+def control_state_space(delayed_system: DelayedSystem) -> "control.StateSpace":
     """State-space model of python-control in which each axle's noise is a separate input, axle after axle; the user
     must apply the delays.
 

@@ -25,8 +25,8 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from scipy.special import eval_legendre, spherical_jn
 
-from models.ride.marginal import Unstable
-from models.road.excitation import Excitation
+from models.ride.marginal import UnstableVehicle
+from models.road.excitation import RoadExcitation
 from models.vehicles.linear_vehicle import LinearVehicle, eigenvalues
 
 GAUSS_POINTS = 16
@@ -46,12 +46,12 @@ of rounding."""
 SILENCE_SHARE = 1e-24
 """Share of its terms' squares below which an output is zero by symmetry, so that its value is only rounding."""
 
-Weights = Mapping[str, Callable[[np.ndarray], np.ndarray]]
+WeightingNames = Mapping[str, Callable[[np.ndarray], np.ndarray]]
 """Weighting of each output by name: its complex factor as a function of the frequency in Hz."""
 
 
 @dataclass(frozen=True)
-class Quadrature:
+class QuadratureResult:
     """Result of the integration: variance (p,), its estimated relative error (p,), and the number of frequencies
     used."""
 
@@ -71,7 +71,7 @@ def transfer_functions(linear_vehicle: LinearVehicle, angular_frequencies: np.nd
     return rows @ motion + read.road_factors + s * read.road_rate_factors
 
 
-def road_transfer(road_excitation: Excitation, speed: float, angular_frequencies: np.ndarray) -> np.ndarray:
+def road_transfer(road_excitation: RoadExcitation, speed: float, angular_frequencies: np.ndarray) -> np.ndarray:
     """Transfer functions (a, n, w, k), in m / sqrt(1/s), from the road's noise to the heights under the wheels, one
     axle after the other, without delays."""
     s = 1j * np.asarray(angular_frequencies, float)[:, None, None]
@@ -82,10 +82,10 @@ def road_transfer(road_excitation: Excitation, speed: float, angular_frequencies
 
 def spectral_densities(
     linear_vehicle: LinearVehicle,
-    road_excitation: Excitation,
+    road_excitation: RoadExcitation,
     speed: float,
     angular_frequencies: np.ndarray,
-    weighting_filters: Weights | None = None,
+    weighting_filters: WeightingNames | None = None,
 ) -> np.ndarray:
     """Two-sided spectral densities (n, p) of the outputs over the angular frequency (rad/s); their integral over
     positive and negative frequencies is the variance."""
@@ -100,14 +100,14 @@ def spectral_densities(
 
 
 def one_sided_densities(
-    linear_vehicle: LinearVehicle, road_excitation: Excitation, speed: float, frequencies: np.ndarray
+    linear_vehicle: LinearVehicle, road_excitation: RoadExcitation, speed: float, frequencies: np.ndarray
 ) -> np.ndarray:
     """One-sided spectral densities (n, p) of the outputs over the frequency (Hz)."""
     return 4 * np.pi * spectral_densities(linear_vehicle, road_excitation, speed, 2 * np.pi * frequencies)
 
 
 def _weighted_transfer(
-    linear_vehicle: LinearVehicle, angular_frequencies: np.ndarray, weighting_filters: Weights
+    linear_vehicle: LinearVehicle, angular_frequencies: np.ndarray, weighting_filters: WeightingNames
 ) -> np.ndarray:
     """Transfer functions (n, p, w) from road heights to outputs, in which weighted outputs replace the unweighted
     ones."""
@@ -119,8 +119,11 @@ def _weighted_transfer(
 
 
 def variances_by_quadrature(
-    linear_vehicle: LinearVehicle, road_excitation: Excitation, speed: float, weighting_filters: Weights | None = None
-) -> Quadrature:
+    linear_vehicle: LinearVehicle,
+    road_excitation: RoadExcitation,
+    speed: float,
+    weighting_filters: WeightingNames | None = None,
+) -> QuadratureResult:
     """Variances of the outputs as integrals of their spectra over all frequencies; inf where an integral diverges.
 
     Outputs with a weighting are replaced by their weighted ones.
@@ -159,7 +162,7 @@ def variances_by_quadrature(
     error += abs(first[-1]) + rounding  # beyond the last panel lies as much as in it
     known = np.divide(error, variance, out=np.zeros(len(total)), where=variance > 0)
     diverges = (abs(first[[0, -1]]) > 0.1 * total).any(axis=0)
-    return Quadrature(np.where(diverges, np.inf, variance), known, panels_used * GAUSS_POINTS)
+    return QuadratureResult(np.where(diverges, np.inf, variance), known, panels_used * GAUSS_POINTS)
 
 
 def _check_stable(linear_vehicle: LinearVehicle) -> None:
@@ -167,7 +170,7 @@ def _check_stable(linear_vehicle: LinearVehicle) -> None:
     rates = eigenvalues(linear_vehicle)
     worst = rates[rates.real.argmax()]
     if worst.real > GROWTH_SHARE * abs(rates).max():
-        raise Unstable(worst.real, abs(worst.imag) / (2 * np.pi))
+        raise UnstableVehicle(worst.real, abs(worst.imag) / (2 * np.pi))
 
 
 def _halve_panels(
@@ -207,7 +210,7 @@ def _panel_integrals(
     delayed_parts: np.ndarray,
     panel_centres: np.ndarray,
     panel_half_widths: np.ndarray,
-    road_excitation: Excitation,
+    road_excitation: RoadExcitation,
     speed: float,
 ) -> np.ndarray:
     """Contributions (panels, p) to the variances, for outputs that are sums of delayed parts (a, panels, nodes, p, k);
@@ -222,7 +225,7 @@ def _panel_integrals(
     return integrals * panel_half_widths[:, None] / np.pi
 
 
-def _panel_edges(linear_vehicle: LinearVehicle, road_excitation: Excitation, speed: float) -> np.ndarray:
+def _panel_edges(linear_vehicle: LinearVehicle, road_excitation: RoadExcitation, speed: float) -> np.ndarray:
     """Edges (rad/s) of the first panels: frequencies that double from nearly 0 to far above all motions, and the
     undamped natural frequencies."""
     squares = abs(np.linalg.eigvals(np.linalg.solve(linear_vehicle.mass, linear_vehicle.stiffness)))
@@ -234,7 +237,7 @@ def _panel_edges(linear_vehicle: LinearVehicle, road_excitation: Excitation, spe
     return np.unique(np.concatenate([[0.0], doublings, natural]))
 
 
-Densities = Callable[[np.ndarray], np.ndarray]
+HeightDensities = Callable[[np.ndarray], np.ndarray]
 """Function from wavenumbers (k,) in rad/m to the two-sided densities (k, w, w) of the heights under the wheels, see
 models/road/isotropic.py."""
 GAUSS_POINTS_PER_PANEL = 10
@@ -243,7 +246,7 @@ delay."""
 
 
 def output_densities(
-    linear_vehicle: LinearVehicle, height_densities: Densities, speed: float, wavenumbers: np.ndarray
+    linear_vehicle: LinearVehicle, height_densities: HeightDensities, speed: float, wavenumbers: np.ndarray
 ) -> np.ndarray:
     """Two-sided spectral densities (k, p) of the outputs over the wavenumber (rad/m), in unit^2 m, at a speed in
     m/s."""
@@ -253,13 +256,13 @@ def output_densities(
 
 def variances_over_wavenumbers(
     linear_vehicle: LinearVehicle,
-    height_densities: Densities,
+    height_densities: HeightDensities,
     speed: float,
     lowest_wavenumber: float,
     highest_wavenumber: float,
 ) -> np.ndarray:
-    """Variances (p,) of the outputs in unit^2, from wavenumbers between ``lowest_wavenumber`` and ``highest_wavenumber`` (rad/m), positive and
-    negative.
+    """Variances (p,) of the outputs in unit^2, from wavenumbers between ``lowest_wavenumber`` and
+    ``highest_wavenumber`` (rad/m), positive and negative.
 
     What lies outside is left out: a band limit where that is wanted, an error where it is not.
     """
@@ -270,8 +273,9 @@ def variances_over_wavenumbers(
 def signed_wavenumbers(
     linear_vehicle: LinearVehicle, lowest_wavenumber: float, highest_wavenumber: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positive and negative wavenumbers (k,) in rad/m with absolute values between ``lowest_wavenumber`` and ``highest_wavenumber``, and their
-    weights for integration."""
+    """Positive and negative wavenumbers (k,) in rad/m with absolute values between ``lowest_wavenumber`` and
+    ``highest_wavenumber``, and their weights for integration.
+    """
     behind = linear_vehicle.axles[0] - linear_vehicle.axles[-1]
     longest = np.pi / behind if behind else np.inf
     edges = [lowest_wavenumber]
@@ -291,7 +295,7 @@ FREQUENCIES_AT_ONCE = 2000
 
 
 def standard_errors(
-    linear_vehicle: LinearVehicle, road_excitation: Excitation, speed: float, duration: float
+    linear_vehicle: LinearVehicle, road_excitation: RoadExcitation, speed: float, duration: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Standard errors (p,) of an output's mean, and of its mean square, when averaged over a time of ``duration``
     (s)."""

@@ -30,7 +30,7 @@ ZERO_PRODUCT_SHARE = 10 * float(np.finfo(float).eps)
 rounding."""
 
 
-class Unstable(InputError):
+class UnstableVehicle(InputError):
     """Error of a system that leaves its equilibrium without excitation: its ``growth`` rate in 1/s and ``frequency`` in
     Hz."""
 
@@ -82,10 +82,10 @@ def split_marginal(A: np.ndarray, matrix_accuracy: float = MATRIX_ACCURACY) -> M
     ``matrix_accuracy`` of A, relative to its norm once its states are scaled: what is smaller counts as zero.
     """
     balanced, scale, norm = _balanced_matrix(A)
-    V, form, zeros, left = _zeros_first(balanced, matrix_accuracy * norm)
+    V, form, zeros, left = _zero_eigenvalues_first(balanced, matrix_accuracy * norm)
     if zeros and matrix_accuracy * norm > FREE_ROUNDING:
-        _refuse(norm)
-    U, stable_part, undamped = _undamped_first(form[zeros:, zeros:], 10 * matrix_accuracy * norm)
+        _refuse_inseparable(norm)
+    U, stable_part, undamped = _undamped_pairs_first(form[zeros:, zeros:], 10 * matrix_accuracy * norm)
     k = zeros + undamped
     V[:, zeros:] = V[:, zeros:] @ U
     form[:zeros, zeros:] = form[:zeros, zeros:] @ U
@@ -114,7 +114,7 @@ FREE_ROUNDING = 1e-3
 comes to rest."""
 
 
-def _refuse(fastest_rate: float) -> None:
+def _refuse_inseparable(fastest_rate: float) -> None:
     raise InputError(
         "",
         "vehicle",
@@ -140,7 +140,7 @@ def _ratio_to_slowest_decay(neglected_rate: float, S: np.ndarray) -> float:
     return neglected_rate / float(-np.linalg.eigvals(S).real.max()) if len(S) else 0.0
 
 
-def _zeros_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int, float]:
+def _zero_eigenvalues_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int, float]:
     """Orthogonal matrix Q, the form Q' A Q with its zero eigenvalues first, the block of these strictly upper
     triangular; their number; and the largest singular value that was taken for 0.
 
@@ -162,7 +162,7 @@ def _zeros_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarra
     return Q, form, nullity, left
 
 
-def _undamped_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int]:
+def _undamped_pairs_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int]:
     """Orthogonal matrix U, the ordered real Schur form U' A U with its undamped pairs first, and the number of their
     eigenvalues.
 
@@ -177,7 +177,7 @@ def _undamped_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.nda
     growing = values[~on_the_axis & (values.real >= 0)]
     if len(growing):
         worst = growing[growing.real.argmax()]
-        raise Unstable(worst.real, abs(worst.imag) / (2 * np.pi))
+        raise UnstableVehicle(worst.real, abs(worst.imag) / (2 * np.pi))
     if not on_the_axis.any():
         return np.eye(len(A)), A, 0
     form, U, undamped = schur(A, output="real", sort=on_axis)
@@ -224,7 +224,7 @@ LARGEST_CONDITION = 1e8
 
 
 @dataclass(frozen=True)
-class Growth:
+class VarianceGrowth:
     """Long-run growth of each output's variance: rate * t^power (t in s), with power 0 where it does not grow."""
 
     rate: np.ndarray
@@ -239,7 +239,7 @@ def variance_growth(
     has_independent_axles: bool,
     variance: np.ndarray,
     matrix_accuracy: float = MATRIX_ACCURACY,
-) -> Growth:
+) -> VarianceGrowth:
     """Long-run growth of the variances of the outputs y = C x along the marginal motions, under noise through B_i (n,
     k) with delays tau_i (s).
 
@@ -285,7 +285,7 @@ def variance_growth(
         largest_rounding,
     )
     rate = np.where(power <= 1, rate + swung, rate)
-    return Growth(rate, np.where((power == 0) & (swung > 0), 1, power))
+    return VarianceGrowth(rate, np.where((power == 0) & (swung > 0), 1, power))
 
 
 def _growth_by_zeros(

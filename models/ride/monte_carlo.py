@@ -23,7 +23,7 @@ from models.ride.covariance import FINITE, stationary_covariance
 from models.ride.excited import DelayedSystem
 from models.ride.road_in_path import system_at_speed, taylor_terms
 from models.ride.speed_profile import SpeedProfile
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
 LEGENDRE_MODES = 8
@@ -69,7 +69,7 @@ class VarianceEstimate:
 
 def variances_along_drive(
     linear_vehicle: LinearVehicle,
-    road_excitation: Excitation,
+    road_excitation: RoadExcitation,
     speed_profile: SpeedProfile,
     instants: Sequence[float] | np.ndarray,
     *,
@@ -86,7 +86,7 @@ def variances_along_drive(
     slowest = float(speed_profile.speeds.min())
     if slowest == 0.0:
         raise InputError("", "drive.speed", 0.0, "must be above 0 for Monte Carlo, which steps along the road")
-    cells = _Cells(linear_vehicle, road_excitation, weightings, slowest)
+    cells = _PathCells(linear_vehicle, road_excitation, weightings, slowest)
     ends = speed_profile.time(cells.length * np.arange(1, int(speed_profile.paths[-1] / cells.length) + 1))
     wanted = np.unique(np.abs(ends[:, None] - np.asarray(instants)).argmin(axis=0))
     first = float(speed_profile.speeds[0])
@@ -102,7 +102,7 @@ def variances_along_drive(
 
 def variances_at_constant_speed(
     linear_vehicle: LinearVehicle,
-    road_excitation: Excitation,
+    road_excitation: RoadExcitation,
     speed: float,
     duration: float,
     *,
@@ -112,7 +112,7 @@ def variances_at_constant_speed(
 ) -> VarianceEstimate:
     """Stationary variances (1, p) of the outputs at a constant speed (m/s), averaged over the copies and, in each of
     them, over ``duration`` (s)."""
-    cells = _Cells(linear_vehicle, road_excitation, weightings, speed)
+    cells = _PathCells(linear_vehicle, road_excitation, weightings, speed)
     skipped, counted = cells.cells_to_forget(speed), max(1, round(duration * speed / cells.length))
     total = np.zeros(())
     for number, x in enumerate(cells.states(np.full(skipped + counted, cells.length / speed), copy_count, seed)):
@@ -141,13 +141,13 @@ def path_cell(
         count += 1
 
 
-class _Cells:
+class _PathCells:
     """Vehicle on a path that is divided into cells, which fit its axle distances and its slowest speed (m/s)."""
 
     def __init__(
         self,
         linear_vehicle: LinearVehicle,
-        road_excitation: Excitation,
+        road_excitation: RoadExcitation,
         weightings: Mapping[str, str] | None,
         slowest_speed: float,
     ) -> None:
@@ -172,8 +172,9 @@ class _Cells:
         return int(np.ceil(FORGETTING_EXPONENT / slowest * speed / self.length))
 
     def states(self, crossing_times: np.ndarray, copy_count: int, seed: int) -> Iterator[np.ndarray]:
-        """States (n, copies) at the end of each cell; ``crossing_times`` : times (s) in which the first axle crosses the
-        cells."""
+        """States (n, copies) at the end of each cell; ``crossing_times`` : times (s) in which the first axle crosses
+        the cells.
+        """
         k, axles = self.at_unit_speed.B[0].shape[1], len(self.at_unit_speed.B)
         independent = self.at_unit_speed.independent
         draws = _draw_coefficients(seed, copy_count, k * LEGENDRE_MODES * (axles if independent else 1))

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.ride.copies_kernel import POWERS_SUMMED, Curves, ForceLaws, PushingTyres, march
+from models.ride.copies_kernel import POWERS_SUMMED, ForceCurves, ForceLaws, PushingTyres, march_copies
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import nonlinear_springs, statistically_linear
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.linear_vehicle import LinearVehicle, eigenvalues
 from models.vehicles.spatial import Curve, PartOutput, SpatialOutput, SpatialVehicle, SpringDamper, Tyre, TyreOutput
@@ -36,7 +36,7 @@ SLOWEST_DECAY_SHARE = 1e-6
 
 
 @dataclass(frozen=True)
-class Copies:
+class CopyStatistics:
     """Statistics of the outputs of the copies: for each copy (copies, p) the means of y, y^2, y^3 and y^4 over the
     counted time.
 
@@ -94,14 +94,14 @@ class Copies:
 
 def copies_in_time(
     vehicle: SpatialVehicle,
-    road_excitation: Excitation,
+    road_excitation: RoadExcitation,
     speed: float,
     duration: float,
     *,
     copy_count: int = 500,
     seed: int = 0,
     longest_step: float | None = None,
-) -> Copies:
+) -> CopyStatistics:
     """Simulate the copies for ``duration`` (s), after a settling time in which they lose the memory of their initial
     state.
 
@@ -119,7 +119,7 @@ def copies_in_time(
         if left <= STEPS_PER_BLOCK:
             break
     moments = march.sums.swapaxes(1, 2) / len(range(0, counted, STEPS_PER_READING))
-    return Copies(march.plain.names, moments, road.step, counted * road.step, settling)
+    return CopyStatistics(march.plain.names, moments, road.step, counted * road.step, settling)
 
 
 RERUN_SHARE = 0.5
@@ -127,7 +127,12 @@ RERUN_SHARE = 0.5
 
 
 def coarser_variances(
-    vehicle: SpatialVehicle, road_excitation: Excitation, speed: float, fine_copies: Copies, step_factor: int, seed: int
+    vehicle: SpatialVehicle,
+    road_excitation: RoadExcitation,
+    speed: float,
+    fine_copies: CopyStatistics,
+    step_factor: int,
+    seed: int,
 ) -> np.ndarray:
     """Variances (k, p) of the outputs about their means for the first k copies, simulated again on the same roads with
     steps that are ``step_factor`` (2 or 4) times as long."""
@@ -174,7 +179,7 @@ class CopiesMarch:
         if self.states is None:
             self.states = np.vstack([_static_positions(self.plain, road_paths[0])] * 2)
             self.states[len(self.plain.mass) :] = 0.0
-        march(self.states, road_paths, self.step, first_counted_step, counting_stride, self.laws, self.sums)
+        march_copies(self.states, road_paths, self.step, first_counted_step, counting_stride, self.laws, self.sums)
 
 
 def usual_step(vehicle: SpatialVehicle, speed: float, linearised_vehicle: LinearVehicle) -> float:
@@ -229,8 +234,9 @@ def _slopes_of_pieces(force_curve: Curve | None) -> np.ndarray:
 def force_laws(
     vehicle: SpatialVehicle, linear_vehicle: LinearVehicle, bent_springs: tuple[SpringDamper, ...], speed: float
 ) -> ForceLaws:
-    """``ForceLaws`` of the vehicle for compiled loops; ``linear_vehicle`` is the vehicle without the nonlinear parts of these
-    springs."""
+    """``ForceLaws`` of the vehicle for compiled loops; ``linear_vehicle`` is the vehicle without the nonlinear parts of
+    these springs.
+    """
     n = len(linear_vehicle.mass)
     watched = replace(vehicle, outputs=tuple(PartOutput(s.name, "travel", s.name) for s in bent_springs))
     rows = np.array([o.displacement_factors for o in linearise(watched, speed).outputs]).reshape(-1, n)
@@ -300,12 +306,14 @@ def _pushing_tyres(vehicle: SpatialVehicle, tyres: Sequence[Tyre], wheel_rises: 
     return PushingTyres(wheel, load, stiffness, damping, wheel_rises)
 
 
-def _padded_curves(force_curves: Sequence[Curve | None]) -> Curves:
-    """``Curves`` of the springs, padded with bends of 0; a spring without a curve gets a curve that is 0 everywhere."""
+def _padded_curves(force_curves: Sequence[Curve | None]) -> ForceCurves:
+    """``ForceCurves`` of the springs, padded with bends of 0; a spring without a curve gets a curve that is 0
+    everywhere.
+    """
     known = [curve.hinges() if curve else (0.0, 0.0, (), ()) for curve in force_curves]
     most_corners = max((len(corners) for _, _, corners, _ in known), default=0)
     offset, slope = np.array([line for *line, _, _ in known], dtype=float).reshape(-1, 2).T.copy()
     corners, bends = np.zeros((len(known), most_corners)), np.zeros((len(known), most_corners))
     for i, (_, _, corners_of_curve, bent_by) in enumerate(known):
         corners[i, : len(corners_of_curve)], bends[i, : len(corners_of_curve)] = corners_of_curve, bent_by
-    return Curves(offset, slope, corners, bends)
+    return ForceCurves(offset, slope, corners, bends)

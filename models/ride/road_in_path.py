@@ -10,7 +10,7 @@ With y = x - sum_i T_i f_i the rate is gone, and with it the white noise and the
     y' = A y + sum_i (R_i + A T_i) f_i,    f_i(t) = f(s(t) - L_i).
 
 Only s(t) still knows how fast the vehicle drives. At standstill s stays, f stays, and y goes on to its rest.
-``Responses`` say how this state moves within a step of a drive, and what it has of noise met within the step.
+``DriveResponses`` say how this state moves within a step of a drive, and what it has of noise met within the step.
 """
 
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ from scipy.linalg import expm
 from models.ride.excited import DelayedSystem, vehicle_with_road
 from models.ride.speed_profile import UNIT_POINTS, UNIT_WEIGHTS, SpeedProfile
 from models.ride.weighting import system_with_weightings
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
 
@@ -42,11 +42,11 @@ class RoadInPath:
     C: np.ndarray
     C_per_speed: np.ndarray
     names: tuple[str, ...]
-    excitation: Excitation
+    excitation: RoadExcitation
 
 
 def road_in_path(
-    linear_vehicle: LinearVehicle, road_excitation: Excitation, weightings: Mapping[str, str] | None = None
+    linear_vehicle: LinearVehicle, road_excitation: RoadExcitation, weightings: Mapping[str, str] | None = None
 ) -> RoadInPath:
     """``RoadInPath`` of a vehicle on a road, with weighted outputs as in ``system_with_weightings``; raises the errors
     of that function.
@@ -86,7 +86,7 @@ def road_in_path(
 
 def system_at_speed(
     linear_vehicle: LinearVehicle,
-    road_excitation: Excitation,
+    road_excitation: RoadExcitation,
     speed: float,
     weightings: Mapping[str, str] | None = None,
 ) -> DelayedSystem:
@@ -98,7 +98,7 @@ SERIES_TERMS = 24
 """Count of terms of exponential series within a step, where rate times time is about 1: 1.5^24 / 24! = 3e-20."""
 
 
-class Responses:
+class DriveResponses:
     """Transition matrices of the state (y, f) along a drive with varying speed, exact in time and in path.
 
     Between the points of the profile only: on a step the path must be a polynomial of time.

@@ -16,7 +16,7 @@ from scipy.linalg import block_diag, expm, solve_continuous_lyapunov
 from models.core.errors import InputError
 from models.core.noise import ROAD, normal_samples
 from models.ride.monte_carlo import path_cell
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.vehicles.spatial import SpatialVehicle
 
 
@@ -24,7 +24,7 @@ from models.vehicles.spatial import SpatialVehicle
 class RoadPath:
     """Random road travelled at a constant ``speed`` (m/s) and sampled every ``half_step`` (s)."""
 
-    excitation: Excitation
+    excitation: RoadExcitation
     speed: float
     half_step: float
 
@@ -80,8 +80,8 @@ class RoadPath:
         lags_of_axles: np.ndarray,
         row_count: int,
     ) -> np.ndarray:
-        """Heights and rates (row_count, 2 w, copies) under all wheels, from the filter states ``filter_states`` with each
-        axle's delay.
+        """Heights and rates (row_count, 2 w, copies) under all wheels, from the filter states ``filter_states`` with
+        each axle's delay.
         """
         roads = np.zeros((row_count, 2 * len(height_rows[0]), filter_states.shape[2]))
         for lag, H in zip(lags_of_axles, height_rows, strict=True):
@@ -91,7 +91,7 @@ class RoadPath:
         return roads
 
 
-def check_rates(vehicle: SpatialVehicle, road_excitation: Excitation, scene_path: str = "") -> None:
+def check_rates(vehicle: SpatialVehicle, road_excitation: RoadExcitation, scene_path: str = "") -> None:
     """Raise InputError for damped tyres on a road whose heights have no rates: time integration cannot read them."""
     if any(tyre.damping for tyre in vehicle.tyres) and not RoadPath(road_excitation, 1.0, 1.0).has_rates:
         raise InputError(
@@ -103,13 +103,13 @@ def check_rates(vehicle: SpatialVehicle, road_excitation: Excitation, scene_path
         )
 
 
-def road_path(road_excitation: Excitation, speed: float, longest_step: float) -> RoadPath:
+def road_path(road_excitation: RoadExcitation, speed: float, longest_step: float) -> RoadPath:
     """Road path for time integration with steps (s) of at most ``longest_step``; its half steps divide the axle
     distances."""
     return RoadPath(road_excitation, speed, path_cell(road_excitation.lengths, speed * longest_step / 2.0)[0] / speed)
 
 
-def _axles(road_excitation: Excitation) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
+def _axles(road_excitation: RoadExcitation) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
     """Filter matrices F, G and heights of the independent noise sources: one filter, or one per axle if the axles are
     independent."""
     F, G, heights = road_excitation.F, road_excitation.G, road_excitation.heights

@@ -19,7 +19,7 @@ from models.core.errors import InputError, RunFailed
 from models.ride.covariance import StationaryCovariance, stationary_covariance
 from models.ride.excited import DelayedSystem, vehicle_with_road
 from models.ride.gaussian_laws import linearised_rate_law, linearised_travel_law
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
 from models.vehicles.spatial import PartKind, PartOutput, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import Gains, linearise
@@ -47,7 +47,7 @@ motion."""
 
 
 @dataclass(frozen=True)
-class BentSpring:
+class BentSpringResult:
     """A nonlinear spring (curves or friction) in random motion: its equivalent stiffness and damping (N/m, N s/m), mean
     travel (m) and mean force (N).
 
@@ -76,7 +76,7 @@ class StatisticallyLinear:
     system: DelayedSystem
     covariance: StationaryCovariance
     mean: np.ndarray
-    springs: dict[str, BentSpring]
+    springs: dict[str, BentSpringResult]
     left_out: np.ndarray
     sentences: tuple[str, ...]
     gain_changes: tuple[float, ...]
@@ -106,7 +106,7 @@ def nonlinear_springs(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
 
 
 def statistically_linear(
-    vehicle: SpatialVehicle, road_excitation: Excitation, speed: float, start_scale: float = 1.0
+    vehicle: SpatialVehicle, road_excitation: RoadExcitation, speed: float, start_scale: float = 1.0
 ) -> StatisticallyLinear:
     """Statistical linearisation of a vehicle with nonlinear springs on a road, at a constant speed (m/s).
 
@@ -131,7 +131,7 @@ force."""
 
 
 @dataclass
-class _Moments:
+class _SpringMoments:
     """Moments of the nonlinear springs' motion: mean travel (m), and standard deviations of travel (m) and rate (m/s),
     each (springs,)."""
 
@@ -144,7 +144,7 @@ class _FixedPointSearch:
     """Fixed-point search for the equivalent gains of one vehicle, road and speed; extra outputs read the motion of the
     nonlinear springs."""
 
-    def __init__(self, vehicle: SpatialVehicle, road_excitation: Excitation, speed: float) -> None:
+    def __init__(self, vehicle: SpatialVehicle, road_excitation: RoadExcitation, speed: float) -> None:
         self.vehicle, self.excitation, self.speed = vehicle, road_excitation, speed
         self.springs = nonlinear_springs(vehicle)
         kinds: tuple[PartKind, ...] = ("travel", "travel rate")
@@ -157,7 +157,7 @@ class _FixedPointSearch:
     def iterate_to_fixed_point(self, start_scale: float) -> StatisticallyLinear:
         """Iterate the gains to the fixed point; returns the linearised vehicle."""
         count = len(self.springs)
-        first = _Moments(
+        first = _SpringMoments(
             np.zeros(count),
             np.full(count, start_scale * FIRST_TRAVEL_DEVIATION),
             np.full(count, start_scale * FIRST_RATE_DEVIATION),
@@ -180,13 +180,13 @@ class _FixedPointSearch:
             gains = gains + relaxation_factor * (wanted - gains)
         return self._result(gains, moments, position, changes)
 
-    def _equivalent_gains(self, spring_moments: _Moments) -> np.ndarray:
+    def _equivalent_gains(self, spring_moments: _SpringMoments) -> np.ndarray:
         """Equivalent stiffness and damping (springs, 2) of the nonlinear springs at given moments of their motion."""
         laws = zip(self.springs, self._linearised_laws(spring_moments), strict=True)
         rows = [(s.stiffness + travel[1], s.damping + rate[1]) for s, (travel, rate) in laws]
         return np.array(rows).reshape(-1, 2)
 
-    def _linearised_laws(self, spring_moments: _Moments) -> list[tuple[LinearisedLaw, LinearisedLaw]]:
+    def _linearised_laws(self, spring_moments: _SpringMoments) -> list[tuple[LinearisedLaw, LinearisedLaw]]:
         """Statistical linearisation of each spring's force laws over travel and over rate: mean force, gain, and
         variance of the remaining force."""
         moments_by_spring = zip(
@@ -201,7 +201,9 @@ class _FixedPointSearch:
         named = {s.name: (float(k), float(c)) for s, (k, c) in zip(self.springs, equivalent_gains, strict=True)}
         return linearise(vehicle, self.speed, named)
 
-    def _spring_moments(self, equivalent_gains: np.ndarray, mean_position: np.ndarray) -> tuple[_Moments, np.ndarray]:
+    def _spring_moments(
+        self, equivalent_gains: np.ndarray, mean_position: np.ndarray
+    ) -> tuple[_SpringMoments, np.ndarray]:
         """Moments of the springs' motion in the linearised vehicle, and its mean position (n,)."""
         linear = self._linearised_vehicle(equivalent_gains, self.watched)
         deviation = stationary_covariance(vehicle_with_road(linear, self.excitation, self.speed)).deviation[
@@ -211,7 +213,7 @@ class _FixedPointSearch:
             raise RunFailed("statistical linearisation", "the travel of a bent spring has no finite variance here")
         travel, rate = np.split(deviation, 2)
         mean_position = self._mean_position(travel, rate, mean_position)
-        return _Moments(self.rows @ mean_position, travel, rate), mean_position
+        return _SpringMoments(self.rows @ mean_position, travel, rate), mean_position
 
     def _mean_position(self, mean_travels: np.ndarray, mean_rates: np.ndarray, mean_position: np.ndarray) -> np.ndarray:
         """Mean position (n,) in which all mean forces are in equilibrium, by Newton's method; unconstrained motions
@@ -233,7 +235,7 @@ class _FixedPointSearch:
     def _result(
         self,
         equivalent_gains: np.ndarray,
-        spring_moments: _Moments,
+        spring_moments: _SpringMoments,
         mean_position: np.ndarray,
         gain_changes: list[float],
     ) -> StatisticallyLinear:
@@ -258,8 +260,8 @@ class _FixedPointSearch:
         )
 
     def _spring_in_motion(
-        self, spring_index: int, equivalent_gains: np.ndarray, spring_moments: _Moments
-    ) -> BentSpring:
+        self, spring_index: int, equivalent_gains: np.ndarray, spring_moments: _SpringMoments
+    ) -> BentSpringResult:
         s, mean, d, r = (
             self.springs[spring_index],
             float(spring_moments.mean[spring_index]),
@@ -269,7 +271,7 @@ class _FixedPointSearch:
         travel, rate = self._linearised_laws(spring_moments)[spring_index]
         lost = travel[2] + rate[2]
         total = lost + (equivalent_gains[0] * d) ** 2 + (equivalent_gains[1] * r) ** 2
-        return BentSpring(
+        return BentSpringResult(
             (float(equivalent_gains[0]), float(equivalent_gains[1])),
             mean,
             d,
@@ -279,7 +281,7 @@ class _FixedPointSearch:
         )
 
     def _output_means(
-        self, springs: dict[str, BentSpring], linearised_vehicle: LinearVehicle, mean_position: np.ndarray
+        self, springs: dict[str, BentSpringResult], linearised_vehicle: LinearVehicle, mean_position: np.ndarray
     ) -> np.ndarray:
         """Means (p,) of the outputs. The mean force of a nonlinear spring is not its gain times its mean travel."""
         means = np.array([output.displacement_factors @ mean_position for output in linearised_vehicle.outputs])
@@ -291,7 +293,7 @@ class _FixedPointSearch:
     def _left_out(
         self,
         linearised_vehicle: LinearVehicle,
-        spring_moments: _Moments,
+        spring_moments: _SpringMoments,
         delayed_system: DelayedSystem,
         covariance: StationaryCovariance,
     ) -> np.ndarray:
@@ -314,7 +316,7 @@ class _FixedPointSearch:
         )
         noise = np.diag(np.sqrt(2.0 * corners * lost))
         added = stationary_covariance(
-            vehicle_with_road(forced, Excitation(-np.diag(corners), noise, (np.eye(len(corners)),), (0.0,)), 1.0)
+            vehicle_with_road(forced, RoadExcitation(-np.diag(corners), noise, (np.eye(len(corners)),), (0.0,)), 1.0)
         )
         usable = np.isfinite(covariance.variance) & (covariance.variance > 0) & np.isfinite(added.variance)
         return np.divide(added.variance, covariance.variance, out=np.zeros(len(usable)), where=usable)
@@ -368,7 +370,10 @@ def _left_out_sentence(spring_name: str, left_out_share: float, variance_status:
     """Sentence on how much the left-out share of force may change an output's standard deviation."""
     if variance_status != "finite":
         return f"{spring_name}: {variance_status}, so that there is no deviation to judge"
-    opening = f"{spring_name}: forces that the replaced springs leave out would add {100 * left_out_share:.2g} % to its variance: "
+    opening = (
+        f"{spring_name}: forces that the replaced springs leave out would add {100 * left_out_share:.2g} % "
+        "to its variance: "
+    )
     for largest_share, error, shape in ERROR_GRADES:
         if left_out_share <= largest_share:
             return opening + f"its deviation is good to {100 * error:.0f} %, and {shape}"

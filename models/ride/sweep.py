@@ -20,9 +20,9 @@ from scipy.sparse.csgraph import connected_components
 
 from models.ride.covariance import FINITE, noise_arrivals, rounding_thresholds, stationary_covariance, variance_verdicts
 from models.ride.excited import DelayedSystem, vehicle_with_road
-from models.ride.marginal import MATRIX_ACCURACY, Growth, Unstable
+from models.ride.marginal import MATRIX_ACCURACY, UnstableVehicle, VarianceGrowth
 from models.ride.weighting import system_with_weightings
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
 LARGEST_FAST_ERROR = 1e-9
@@ -30,7 +30,7 @@ LARGEST_FAST_ERROR = 1e-9
 
 
 @dataclass(frozen=True)
-class Sweep:
+class VarianceSweep:
     """Stationary variances over correlation cases and speeds. variance (cases, speeds, outputs), inf where infinite,
     with status and reason for each; units (outputs,).
 
@@ -58,16 +58,16 @@ class Sweep:
 
 def variance_sweep(
     linear_vehicle: Callable[[float], LinearVehicle],
-    excitation_by_case: Mapping[str, Excitation],
+    excitation_by_case: Mapping[str, RoadExcitation],
     speeds: Sequence[float] | np.ndarray,
     weighting_filters: Mapping[str, str] | None = None,
     matrix_accuracy: float = MATRIX_ACCURACY,
     by_modes: bool = True,
-) -> Sweep:
+) -> VarianceSweep:
     """Stationary variances of a vehicle, given as a function of the speed (m/s), on each road at each speed.
 
-    weighting_filters : weightings by output, as ``system_with_weightings`` takes them. by_modes : False sends every point the direct
-    way. Raises Unstable.
+    weighting_filters : weightings by output, as ``system_with_weightings`` takes them. by_modes : False sends every
+    point the direct way. Raises Unstable.
     """
     shared, direct, points = SharedModes(), Counter[str](), []
     for speed in speeds:
@@ -90,7 +90,9 @@ def variance_sweep(
         np.array(per_speed).reshape(shape).swapaxes(0, 1).copy() for per_speed in zip(*points, strict=True)
     )
     units = *(output.unit for output in linear.outputs), *["m/s^2"] * len(weighting_filters or {})
-    return Sweep(tuple(excitation_by_case), np.array(speeds), system.names, units, variance, status, reason, direct)
+    return VarianceSweep(
+        tuple(excitation_by_case), np.array(speeds), system.names, units, variance, status, reason, direct
+    )
 
 
 DIRECT_BY_REQUEST = "asked for"
@@ -103,15 +105,15 @@ def _direct_variances(delayed_system: DelayedSystem, speed: float, matrix_accura
     """Variances from solving the Lyapunov equation; the error for an unstable vehicle states its speed."""
     try:
         exact = stationary_covariance(delayed_system, matrix_accuracy)
-    except Unstable as error:
-        raise Unstable(error.growth, error.frequency, speed) from None
+    except UnstableVehicle as error:
+        raise UnstableVehicle(error.growth, error.frequency, speed) from None
     return exact.variance, exact.status, exact.reason
 
 
 def _fast_variances(
     delayed_system: DelayedSystem,
     vehicle_state_count: int,
-    road_excitation: Excitation,
+    road_excitation: RoadExcitation,
     speed: float,
     shared_modes: "SharedModes",
     matrix_accuracy: float,
@@ -120,7 +122,7 @@ def _fast_variances(
     quick = modal_variances(delayed_system, vehicle_state_count, road_excitation.F, speed, shared_modes)
     if isinstance(quick, str):
         return quick
-    no_growth = Growth(np.zeros(len(delayed_system.C)), np.zeros(len(delayed_system.C), int))
+    no_growth = VarianceGrowth(np.zeros(len(delayed_system.C)), np.zeros(len(delayed_system.C), int))
     status, reason = variance_verdicts(
         noise_arrivals(delayed_system).D,
         quick.variance,
@@ -136,7 +138,7 @@ def _fast_variances(
 
 
 @dataclass(frozen=True)
-class Modes:
+class SystemModes:
     """Eigen-decomposition A = V diag(values) V^-1, and the condition number of V after balancing."""
 
     A: np.ndarray
@@ -155,7 +157,7 @@ class Modes:
         )
 
 
-def modes_of_matrix(A: np.ndarray) -> Modes:
+def modes_of_matrix(A: np.ndarray) -> SystemModes:
     """Eigenvalues and eigenvectors of A (n, n), block by block for uncoupled blocks, so that equal blocks give exactly
     equal results."""
     count, label = connected_components(A != 0, directed=False)
@@ -167,12 +169,12 @@ def modes_of_matrix(A: np.ndarray) -> Modes:
         values[block_indices], vectors = np.linalg.eig(balanced)
         worst = max(worst, np.linalg.cond(vectors))
         if not np.isfinite(worst) or worst * MACHINE_EPSILON > 1:
-            return Modes(A, values, V, inverse, np.inf)
+            return SystemModes(A, values, V, inverse, np.inf)
         V[np.ix_(block_indices, block_indices)], inverse[np.ix_(block_indices, block_indices)] = (
             scale[:, None] * vectors,
             np.linalg.inv(vectors) / scale,
         )
-    return Modes(A, values, V, inverse, worst)
+    return SystemModes(A, values, V, inverse, worst)
 
 
 MACHINE_EPSILON = float(np.finfo(float).eps)
@@ -184,9 +186,9 @@ class SharedModes:
     """Cache of eigen-decompositions, so that roads and speeds with the same block share its modes."""
 
     def __init__(self) -> None:
-        self.known: dict[bytes, Modes] = {}
+        self.known: dict[bytes, SystemModes] = {}
 
-    def of(self, A: np.ndarray) -> Modes:
+    def of(self, A: np.ndarray) -> SystemModes:
         """Modes of a matrix block, computed once."""
         if (key := A.tobytes()) not in self.known:
             self.known[key] = modes_of_matrix(A)
@@ -260,7 +262,7 @@ def modal_variances(
     return _variance_sum(np.concatenate(values), C, inputs, arrivals.delays, arrivals.independent, condition)
 
 
-def _coupling_solution(filter_block: Modes, coupling: np.ndarray, mode_values: np.ndarray) -> np.ndarray:
+def _coupling_solution(filter_block: SystemModes, coupling: np.ndarray, mode_values: np.ndarray) -> np.ndarray:
     """Solution X of A X + coupling = X diag(values), for a diagonalised A."""
     return filter_block.V @ ((filter_block.inverse @ coupling) / (mode_values - filter_block.values[:, None]))
 

@@ -23,10 +23,10 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from models.core.errors import InputError
 from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary_covariance
 from models.ride.marginal import MATRIX_ACCURACY
-from models.ride.road_in_path import Responses, RoadInPath, road_in_path, system_at_speed
+from models.ride.road_in_path import DriveResponses, RoadInPath, road_in_path, system_at_speed
 from models.ride.speed_profile import SpeedProfile, integration_points, step_ends_of_drive
 from models.ride.sweep import variance_sweep
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.vehicles.linear_vehicle import LinearVehicle
 
 LARGEST_RATE_TIMES_STEP = 1.0
@@ -36,7 +36,7 @@ STEPS_PER_BLOCK = 128
 
 
 @dataclass(frozen=True)
-class VaryingSpeed:
+class VaryingSpeedDeviations:
     """Standard deviations of the outputs at every instant of a drive with varying speed.
 
     time, path, speed (N,): s, m, m/s; deviation (N, p) of the outputs in their units, inf where an output diffuses
@@ -67,14 +67,14 @@ class VaryingSpeed:
 
 def varying_speed(
     linear_vehicle: LinearVehicle,
-    road_excitation: Excitation,
+    road_excitation: RoadExcitation,
     speed_profile: SpeedProfile,
     *,
     weightings: Mapping[str, str] | None = None,
     instants: Sequence[float] | np.ndarray = (),
     matrix_accuracy: float = MATRIX_ACCURACY,
     largest_rate_times_step: float = LARGEST_RATE_TIMES_STEP,
-) -> VaryingSpeed:
+) -> VaryingSpeedDeviations:
     """Standard deviations of the outputs along a drive that begins in the stationary state of its first speed, or at
     rest.
 
@@ -115,7 +115,7 @@ def varying_speed(
         rows_of_results.append(_all_variances(form, P, float(speed_profile.speed(np.array(end))), status))
     deviation, height = np.split(np.sqrt(rows_of_results), [len(status)], axis=1)
     end_time_array = np.array(time)
-    return VaryingSpeed(
+    return VaryingSpeedDeviations(
         form.names,
         status,
         end_time_array,
@@ -129,7 +129,7 @@ def varying_speed(
 
 def quasi_stationary(
     linear_vehicle: LinearVehicle,
-    road_excitation: Excitation,
+    road_excitation: RoadExcitation,
     speeds: np.ndarray,
     *,
     weightings: Mapping[str, str] | None = None,
@@ -176,7 +176,7 @@ def _covariance_by_step(
         speed_profile, speed_profile.times[0] - lead, instants, motion, path, largest_rate_times_step
     )
     points = integration_points(speed_profile, ends, sorted({distance for distance in axle_distances if distance}))
-    responses = Responses(path_equations, speed_profile)
+    responses = DriveResponses(path_equations, speed_profile)
     hits = [_NoiseResponses(responses, axle, points.time, ends) for axle in range(len(road.heights))]
     queues = [_ResponseQueue(responses, i, j, points.time, ends) for i, j in pairs]
     for step, (start, end) in enumerate(pairwise(ends)):
@@ -196,7 +196,9 @@ class _NoiseResponses:
     """State responses at the ends of the steps to the noise that an axle meets at given times (s) in ascending
     order."""
 
-    def __init__(self, responses: Responses, axle_index: int, step_times: np.ndarray, step_ends: np.ndarray) -> None:
+    def __init__(
+        self, responses: DriveResponses, axle_index: int, step_times: np.ndarray, step_ends: np.ndarray
+    ) -> None:
         self.responses, self.axle, self.time, self.ends = responses, axle_index, step_times, step_ends
         self.first = np.searchsorted(step_times, step_ends)
         self.made, self.block = np.zeros((0, 0, 0)), -1
@@ -225,7 +227,12 @@ class _ResponseQueue:
     (s)."""
 
     def __init__(
-        self, responses: Responses, axle_index: int, last_axle_index: int, step_times: np.ndarray, step_ends: np.ndarray
+        self,
+        responses: DriveResponses,
+        axle_index: int,
+        last_axle_index: int,
+        step_times: np.ndarray,
+        step_ends: np.ndarray,
     ) -> None:
         profile, form, self.last = responses.profile, responses.form, last_axle_index
         distance = form.excitation.lengths[last_axle_index] - form.excitation.lengths[axle_index]
@@ -255,8 +262,9 @@ def _sum_of_products(first_responses: np.ndarray, second_responses: np.ndarray, 
 
 
 def _delayed_responses(path_equations: RoadInPath, axle_index: int, distance_behind: np.ndarray) -> np.ndarray:
-    """State responses (n, q, k) of a vehicle at rest to noise that an axle met long ago, at a distance ``distance_behind`` (m)
-    its position."""
+    """State responses (n, q, k) of a vehicle at rest to noise that an axle met long ago, at a distance
+    ``distance_behind`` (m) its position.
+    """
     F, G = path_equations.excitation.F, path_equations.excitation.G
     road = np.array([expm(F * distance) @ G for distance in distance_behind]).reshape(-1, *G.shape)
     n, axles, m = path_equations.noise_inputs.shape

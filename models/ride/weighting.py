@@ -18,7 +18,7 @@ from models.ride.excited import DelayedSystem
 
 
 @dataclass(frozen=True)
-class Section:
+class FilterSection:
     """Second-order filter section (n0 + n1 p + n2 p^2) / (1 + p / quality + p^2) with p = s / (2 pi frequency),
     frequency in Hz."""
 
@@ -28,11 +28,11 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Weighting:
+class FrequencyWeighting:
     """Frequency weighting as a product of filter sections; its name is that in the standard."""
 
     name: str
-    sections: tuple[Section, ...]
+    sections: tuple[FilterSection, ...]
 
     def response(self, frequency: np.ndarray) -> np.ndarray:
         """Complex frequency response of the weighting at frequencies (Hz)."""
@@ -67,19 +67,19 @@ def weighting_of_standard(
     weighting_name: str,
     transition_section: tuple[float, float, float] | None,
     upward_step: tuple[float, float, float, float] | None = None,
-) -> Weighting:
+) -> FrequencyWeighting:
     """Weighting from parameters of ISO 2631-1: transition (f3, f4, Q4), step (f5, Q5, f6, Q6); frequencies in Hz.
 
     The band limit is that of all weightings for comfort and health: 0.4 to 100 Hz, Q = 1 / sqrt(2).
     """
-    sections = [Section(100.0, 0.5**0.5, (1.0, 0.0, 0.0)), Section(0.4, 0.5**0.5, (0.0, 0.0, 1.0))]
+    sections = [FilterSection(100.0, 0.5**0.5, (1.0, 0.0, 0.0)), FilterSection(0.4, 0.5**0.5, (0.0, 0.0, 1.0))]
     if transition_section is not None:
         f3, f4, q4 = transition_section
-        sections.append(Section(f4, q4, (1.0, f4 / f3, 0.0)))
+        sections.append(FilterSection(f4, q4, (1.0, f4 / f3, 0.0)))
     if upward_step is not None:
         f5, q5, f6, q6 = upward_step
-        sections.append(Section(f6, q6, ((f5 / f6) ** 2, f5 / f6 / q5, 1.0)))
-    return Weighting(weighting_name, tuple(sections))
+        sections.append(FilterSection(f6, q6, ((f5 / f6) ** 2, f5 / f6 / q5, 1.0)))
+    return FrequencyWeighting(weighting_name, tuple(sections))
 
 
 WEIGHTINGS = {

@@ -23,7 +23,7 @@ from models.road.profile import OVERRUN_SHARE, RoadProfile, SplineProfile
 CONTINUATION_RULES = ("mirrored", "refused")
 RUN_IN_LENGTH = 5.0
 """Default length (m) of the run-in."""
-MOST_POINTS = 5_000_000
+POINT_LIMIT = 5_000_000
 """Largest count of points of a mirrored road: about 400 MB with its coefficients and the fit."""
 
 
@@ -75,8 +75,8 @@ def _mirrored_points(
     station, height = profile.points
     gaps, length = np.diff(station), profile.end - profile.start
     copies = math.ceil((needed_distance - profile.start) / length)
-    if copies * gaps.size > MOST_POINTS:
-        allowed = f"mirroring {profile.name!r} that far takes more than {MOST_POINTS} points"
+    if copies * gaps.size > POINT_LIMIT:
+        allowed = f"mirroring {profile.name!r} that far takes more than {POINT_LIMIT} points"
         raise InputError(scene_path, "distance (m)", needed_distance, allowed)
     stations, heights = [station], [height]
     for i in range(1, copies):
@@ -87,7 +87,7 @@ def _mirrored_points(
     return np.concatenate(stations), np.concatenate(heights)
 
 
-def run_in(
+def road_with_run_in(
     profile: SplineProfile, transition_length: float = RUN_IN_LENGTH, reference_height_value: float | None = None
 ) -> SplineProfile:
     """Road that rises from the flat: height 0 up to its first point, then w(s / length) (zeta - reference).

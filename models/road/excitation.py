@@ -7,7 +7,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Excitation:
+class RoadExcitation:
     """Road filter f' = F f + G w over the path (m), with unit white noise w per metre, and heights under the wheels z =
     sum_i H_i f_i over the axles i.
 

@@ -19,7 +19,7 @@ HIGHEST_WAVENUMBER = 2.0 * math.pi * 2.83
 
 
 @dataclass(frozen=True)
-class FilterFit:
+class RoadFilterFit:
     """First-order filter fitted to a measured density between the wavenumbers ``low_wavenumber`` and
     ``high_wavenumber`` (rad/m).
 
@@ -43,8 +43,8 @@ class FittedRoad:
     their quality, and the spectra."""
 
     road: TwoTrackRoad
-    mean: FilterFit
-    roll: FilterFit | None
+    mean: RoadFilterFit
+    roll: RoadFilterFit | None
     notes: tuple[str, ...]
     spectra: TrackSpectra
 
@@ -57,8 +57,8 @@ def fit_road(
 ) -> FittedRoad:
     """Fit of a first-order mean and roll process by least squares on the logarithms of the measured densities.
 
-    lowest_wavenumber, highest_wavenumber : band of the fit in rad/m; by default from twice the lowest wavenumber that a window holds, where the
-    straight line that was taken out is no longer felt, to the end of the standard's band
+    lowest_wavenumber, highest_wavenumber : band of the fit in rad/m; by default from twice the lowest wavenumber that a
+    window holds, where the straight line that was taken out is no longer felt, to the end of the standard's band
 
     Raises
     ------
@@ -115,14 +115,15 @@ def _fit_first_order(
     lowest_wavenumber: float,
     highest_wavenumber: float,
     process_name: str,
-) -> FilterFit:
+) -> RoadFilterFit:
     """Least-squares fit of ln S = ln(q / 2 pi) - ln(corner^2 + k^2), with the logarithms of q and corner as unknowns,
     to a density over the wavenumber k."""
     from scipy.optimize import least_squares
 
     middle, mean = _band_averages(wavenumbers, density, degrees_of_freedom, lowest_wavenumber, highest_wavenumber)
     if len(middle) < 4:
-        allowed = f"four bands or more are needed between {lowest_wavenumber:.3g} and {highest_wavenumber:.3g} rad/m: the road is too short"
+        band = f"{lowest_wavenumber:.3g} and {highest_wavenumber:.3g} rad/m"
+        allowed = f"four bands or more are needed between {band}: the road is too short"
         raise InputError(process_name, "bands to fit", len(middle), allowed)
 
     def error(log_parameters: np.ndarray) -> np.ndarray:
@@ -139,7 +140,7 @@ def _fit_first_order(
     resolved = bool(lowest_wavenumber < corner < highest_wavenumber * (1.0 - 1e-6) and sd[0] < 0.5)
     residual = math.sqrt(float(np.mean(best.fun**2)))
     filter = ShapeFilter(corner, math.exp(best.x[1]))
-    return FilterFit(filter, float(sd[0]), float(sd[1]), residual, lowest_wavenumber, highest_wavenumber, resolved)
+    return RoadFilterFit(filter, float(sd[0]), float(sd[1]), residual, lowest_wavenumber, highest_wavenumber, resolved)
 
 
 def _band_averages(
@@ -176,15 +177,15 @@ def _data_limit_sentences(measured_tracks: MeasuredTracks, track_spectra_of_road
     lowest_wavenumber = track_spectra_of_road.wavenumber[0]
     low, high = track_spectra_of_road.confidence_factors()
     return [
-        f"{measured_tracks.length:g} m in {track_spectra_of_road.window_count} windows: nothing is known of waves longer than "
-        f"{2.0 * math.pi / lowest_wavenumber:.3g} m ({lowest_wavenumber:.3g} rad/m)",
+        f"{measured_tracks.length:g} m in {track_spectra_of_road.window_count} windows: nothing is known of waves "
+        f"longer than {2.0 * math.pi / lowest_wavenumber:.3g} m ({lowest_wavenumber:.3g} rad/m)",
         f"every single density is known to a factor {low:.2f} to {high:.2f} (95 %)",
         f"a coherency below {track_spectra_of_road.chance_coherency():.2f} cannot be told from none (95 %)",
     ]
 
 
 def _misfit_sentences(
-    track_spectra_of_road: TrackSpectra, mean_fit: FilterFit, roll_fit: FilterFit | None
+    track_spectra_of_road: TrackSpectra, mean_fit: RoadFilterFit, roll_fit: RoadFilterFit | None
 ) -> list[str]:
     """Sentences on where the fitted road differs from the measured one."""
     sentences = []
@@ -219,5 +220,5 @@ def _misfit_sentences(
     return sentences
 
 
-def _scatter_factor(filter_fit: FilterFit) -> float:
+def _scatter_factor(filter_fit: RoadFilterFit) -> float:
     return math.exp(filter_fit.log_residual)

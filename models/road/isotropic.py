@@ -47,8 +47,9 @@ class DensityTerm:
             raise InputError("", "waviness", self.waviness, "must be above 1: else the heights have no variance")
 
     def density(self, wavenumber: np.ndarray, track_distance: float) -> np.ndarray:
-        """Cross density (m^3) of tracks ``track_distance`` (m) apart, or the density of one track at distance 0; infinite
-        where wavenumber and corner are both 0."""
+        """Cross density (m^3) of tracks ``track_distance`` (m) apart, or the density of one track at distance 0;
+        infinite where wavenumber and corner are both 0.
+        """
         from scipy.special import gamma, kv
 
         sigma, order = np.hypot(self.corner, wavenumber), self.waviness / 2.0
@@ -77,7 +78,9 @@ class IsotropicRoad:
         return np.sum([density_part.density(wavenumber, track_distance) for density_part in self.parts], axis=0)
 
     def coherency(self, wavenumber: np.ndarray, track_distance: float) -> np.ndarray:
-        """Coherency of two tracks ``track_distance`` (m) apart: ratio of their cross density to the density of one track."""
+        """Coherency of two tracks ``track_distance`` (m) apart: ratio of their cross density to the density of one
+        track.
+        """
         return self.cross_spectrum(wavenumber, track_distance) / self.spectrum(wavenumber)
 
 

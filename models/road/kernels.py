@@ -10,7 +10,7 @@ import numpy as np
 
 from models.machine.compiled import njit
 
-RESYNCHRONISE = 128
+SAMPLES_PER_RESYNCHRONISATION = 128
 """Count of samples between two exact evaluations of sin and cos in :func:`sines_uniform`.
 
 One rotation adds at most about 2e-16 of a wave's amplitude; 128 of them stay near 1e-14 even if every
@@ -22,7 +22,7 @@ VECTOR_LANES = 16
 full."""
 
 
-class Waves(NamedTuple):
+class RoadWaves(NamedTuple):
     """Waves of a road -w(s) sum amplitude sin(wavenumber s + phase): m, rad/m, rad, all (n,), and the length (m) of its
     window w."""
 
@@ -58,8 +58,9 @@ def fade_in(distance: float, window_length: float, height: float, slope: float) 
 
 @njit(cache=True)
 def sines_at(station, amplitude, wavenumber, phase, window_length):
-    """Height (m, down) and slope of a sum of sines at a station s (m). The arrays of ``Waves`` are separate arguments,
-    since passing the tuple from Python doubles the time."""
+    """Height (m, down) and slope of a sum of sines at a station s (m). The arrays of ``RoadWaves`` are separate
+    arguments, since passing the tuple from Python doubles the time.
+    """
     height, slope = 0.0, 0.0
     if station > 0.0:
         for i in range(amplitude.size):
@@ -104,12 +105,12 @@ def sines_uniform(start_station, station_step, waves, height, slope):
     for i in range(n):  # a slice assigned at once takes seconds to compile
         number[i] = wavenumber[i]
         turn_sine[i], turn_cosine[i] = math.sin(number[i] * station_step), math.cos(number[i] * station_step)
-    for first in range(0, height.size, RESYNCHRONISE):
+    for first in range(0, height.size, SAMPLES_PER_RESYNCHRONISATION):
         s = start_station + first * station_step
         for i in range(n):
             angle = number[i] * s + phase[i]
             sine[i], cosine[i] = amplitude[i] * math.sin(angle), amplitude[i] * math.cos(angle)
-        for j in range(first, min(first + RESYNCHRONISE, height.size)):
+        for j in range(first, min(first + SAMPLES_PER_RESYNCHRONISATION, height.size)):
             value, rate = _rotate_waves(sine, cosine, turn_sine, turn_cosine, number)
             height[j], slope[j] = fade_in(start_station + j * station_step, window, value, rate)
 

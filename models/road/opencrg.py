@@ -70,7 +70,7 @@ def read_opencrg(
     """
     if track_name not in _LATERAL_POSITIONS:
         raise InputError(road_path, "track", track_name, "must be a track", tuple(_LATERAL_POSITIONS))
-    road = _load(road_path)
+    road = _load_opencrg(road_path)
     lines = [
         _heights_at(road_path, road, lateral_offset + side * track_width) for side in _LATERAL_POSITIONS[track_name]
     ]
@@ -134,7 +134,7 @@ def _count_of_stations(road_path: str | Path, road_length: float, increment: flo
     return steps + 1
 
 
-def _load(road_path: str | Path) -> Any:
+def _load_opencrg(road_path: str | Path) -> Any:
     """The complete OpenCRG file as the library reads it; every complaint of the library about reading becomes an
     error."""
     promise = _check_header(road_path)

@@ -84,9 +84,9 @@ class SineProfile:
         object.__setattr__(self, "window_length", _checked_window(self.window_length))
 
     @property
-    def waves(self) -> kernels.Waves:
+    def waves(self) -> kernels.RoadWaves:
         """Waves of the road in the form that compiled functions take."""
-        return kernels.Waves(self.amplitude, self.wavenumber, self.phase, self.window_length)
+        return kernels.RoadWaves(self.amplitude, self.wavenumber, self.phase, self.window_length)
 
     @property
     def extent(self) -> tuple[float, float]:

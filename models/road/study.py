@@ -57,9 +57,10 @@ def road_waves(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Amplitudes (m) and wavenumbers (rad/m) of a road with the one-sided density gd (n / 0.1)^-2.
 
-    Each wave stands for one of ``wave_count`` bins between ``lowest_spatial_frequency`` and ``highest_spatial_frequency`` (waves per metre), spaced
-    by equal ratios, at the bin's geometric mean n: amplitude = sqrt(2 Gd(n) dn). For a density that falls
-    with n^-2 this keeps the power of every bin exactly, because (e2 - e1) / (e1 e2) = 1/e1 - 1/e2.
+    Each wave stands for one of ``wave_count`` bins between ``lowest_spatial_frequency`` and
+    ``highest_spatial_frequency`` (waves per metre), spaced by equal ratios, at the bin's geometric mean n: amplitude =
+    sqrt(2 Gd(n) dn). For a density that falls with n^-2 this keeps the power of every bin exactly, because (e2 - e1) /
+    (e1 e2) = 1/e1 - 1/e2.
     """
     edges = np.geomspace(lowest_spatial_frequency, highest_spatial_frequency, wave_count + 1)
     n = np.sqrt(edges[:-1] * edges[1:])

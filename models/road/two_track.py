@@ -19,7 +19,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from models.core.errors import InputError
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.road.iso8608 import class_at_level
 from models.road.shape_filter import ShapeFilter
 from models.vehicles.linear_vehicle import WheelPosition
@@ -82,18 +82,20 @@ class TwoTrackRoad:
         return self.mean.covariance(distance) + roll
 
     def level(self, lateral_position: float) -> float:
-        """Level S0 (m) of the road's spectrum at lateral position lateral_position (m): without cutoffs the two-sided spectrum there
-        tends to S0 / Omega^2."""
+        """Level S0 (m) of the road's spectrum at lateral position lateral_position (m): without cutoffs the two-sided
+        spectrum there tends to S0 / Omega^2.
+        """
         return (self.mean.intensity + lateral_position * lateral_position * self.roll.intensity) / (2.0 * math.pi)
 
     def label(self, lateral_position: float) -> str:
         """Text with the name of the road at lateral position y (m) and the convention of its level."""
         cutoffs = {f.cutoff for f in (self.mean, self.roll) if f.cutoff is not None}
         steep = f", cut off at {' and '.join(f'{c:g}' for c in sorted(cutoffs))} rad/m" if cutoffs else ""
+        level = self.level(lateral_position)
         return (
-            f"two tracks, corners {self.mean.corner:g} and {self.roll.corner:g} rad/m{steep}; at y = {lateral_position:g} m the "
-            f"spectrum tends to {self.level(lateral_position):.4g} m / Omega^2 two-sided, {2.0 * self.level(lateral_position):.4g} m^3 one-sided at "
-            f"1 rad/m ({class_at_level(self.level(lateral_position))})"
+            f"two tracks, corners {self.mean.corner:g} and {self.roll.corner:g} rad/m{steep}; at y = "
+            f"{lateral_position:g} m the spectrum tends to {level:.4g} m / Omega^2 two-sided, "
+            f"{2.0 * level:.4g} m^3 one-sided at 1 rad/m ({class_at_level(level)})"
         )
 
 
@@ -137,15 +139,16 @@ def road_excitation(
     wheel_positions: Sequence[WheelPosition],
     left_right_correlation: str = "modelled",
     front_rear_correlation: str = "delayed",
-) -> Excitation:
-    """Excitation of the wheels by a two-track two_track_road: one filter per axle, with each wheel at its own lateral position.
+) -> RoadExcitation:
+    """Excitation of the wheels by a two-track two_track_road: one filter per axle, with each wheel at its own lateral
+    position.
 
     Parameters
     ----------
-    left_right_correlation : "modelled", z = z_M + y theta; "uncorrelated", the left wheels and the right wheels each with a pair
-        (z_M, theta) of their own; "equal", z = z_M + abs(y) theta
-    front_rear_correlation : "delayed", every axle meets the noise of the first, its distance later; "uncorrelated", every axle
-        has noise of its own; "equal", every axle meets the noise of the first at once
+    left_right_correlation : "modelled", z = z_M + y theta; "uncorrelated", the left wheels and the right wheels each
+        with a pair (z_M, theta) of their own; "equal", z = z_M + abs(y) theta
+    front_rear_correlation : "delayed", every axle meets the noise of the first, its distance later; "uncorrelated",
+        every axle has noise of its own; "equal", every axle meets the noise of the first at once
 
     Raises
     ------
@@ -164,7 +167,7 @@ def road_excitation(
     axle = np.array([wheel.axle for wheel in wheel_positions])
     heights = tuple(np.where((axle == i)[:, None], rows, 0.0) for i in range(len(behind)))
     lengths = tuple(0.0 for _ in behind) if front_rear_correlation == "equal" else behind
-    return Excitation(F, G, heights, lengths, front_rear_correlation == "uncorrelated")
+    return RoadExcitation(F, G, heights, lengths, front_rear_correlation == "uncorrelated")
 
 
 def input_covariance(

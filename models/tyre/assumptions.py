@@ -6,7 +6,7 @@ from models.core.assumptions import Assumption
 from models.tyre.tyre_table import TyreTable
 
 
-def assumptions(tyre_table: TyreTable, wheel_load: float) -> list[Assumption]:
+def tyre_table_assumptions(tyre_table: TyreTable, wheel_load: float) -> list[Assumption]:
     """Assumptions of a result over "slip_angle" (deg) under a wheel_load (N): that both lie within the tyre table.
 
     A table of one load holds for all of them.

@@ -36,7 +36,7 @@ UNIT_CONTACT = {"a": 1.0, "b": 1.0, "load": 1.0, "mu": 1e9, "xi_y": 1.0, "l1": 1
 
 
 @cache
-def net(cell_count: int) -> FastsimGrid:
+def patch_grid(cell_count: int) -> FastsimGrid:
     """Grid of a contact patch with ``cell_count`` cells per strip, from 3 to 200. Raises InputError otherwise."""
     if isinstance(cell_count, bool) or not isinstance(cell_count, int) or not 3 <= cell_count <= 200:
         raise InputError("", "cells", cell_count, "must be a whole number from 3 to 200")
@@ -49,7 +49,7 @@ def cornering_stiffness_factor(cell_count: int) -> float:
     contacts, answers = np.zeros(1, CONTACT), np.empty(1, FORCES)
     for name, value in UNIT_CONTACT.items():
         contacts[name] = value
-    fill_contact_forces(contacts, *net(cell_count).records, THREE_BRISTLES, SECOND_ORDER_MARCH, answers)
+    fill_contact_forces(contacts, *patch_grid(cell_count).records, THREE_BRISTLES, SECOND_ORDER_MARCH, answers)
     return -float(answers["fy"][0])
 
 
@@ -120,7 +120,7 @@ def brush_forces(
     contacts, forces, cell_net = (
         np.zeros((len(sliding_velocities), 10)),
         np.empty((len(sliding_velocities), 4)),
-        net(cell_count),
+        patch_grid(cell_count),
     )
     patches = contacts.view(CONTACT)
     patches["a"], patches["b"], patches["load"], patches["mu"] = half_length, half_width, load, mu

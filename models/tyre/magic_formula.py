@@ -151,8 +151,8 @@ def table_of_surface(
 ) -> TyreTable:
     """Tyre table of one of ``NAMED_SURFACES``, its friction times ``friction_scale`` at a load (N).
 
-    friction_loss : share of its friction that the tyre has lost at twice that load; 0 for none. It is linear in the load from a
-    quarter of it to twice it, and constant beyond.
+    friction_loss : share of its friction that the tyre has lost at twice that load; 0 for none. It is linear in the
+    load from a quarter of it to twice it, and constant beyond.
     """
     if surface_name not in NAMED_SURFACES:
         raise InputError("", "surface", surface_name, "no such surface", tuple(NAMED_SURFACES))

@@ -47,14 +47,14 @@ def tir_table(tir_path: str | Path) -> TyreTable:
         name for name in properties if name in (*NEEDED_KEYS, *SCALING_FACTORS) or COEFFICIENT_PATTERN.fullmatch(name)
     )
     c = defaultdict(float, dict.fromkeys(SCALING_FACTORS, 1.0)) | {
-        name: _number_of(tir_path, properties, name) for name in named
+        name: _number_of_key(tir_path, properties, name) for name in named
     }
     least_load, largest_load, nominal = c["FZMIN"], c["FZMAX"], c["FNOMIN"]
     for name in ("FNOMIN", "FZMIN", "FZMAX"):
         if not 0.0 < c[name] <= 1e7:
-            raise _wrong_value(tir_path, properties, name, "must be a load above 0 and at most 1e7 N")
+            raise _wrong_value_error(tir_path, properties, name, "must be a load above 0 and at most 1e7 N")
     if not least_load < largest_load:
-        raise _wrong_value(tir_path, properties, "FZMAX", f"must be above FZMIN, {least_load:g}")
+        raise _wrong_value_error(tir_path, properties, "FZMAX", f"must be above FZMIN, {least_load:g}")
     loads = np.unique(
         np.concatenate(
             (np.linspace(least_load, largest_load, LOAD_NODES), np.clip([nominal], least_load, largest_load))
@@ -123,9 +123,9 @@ def _check_properties(tir_path: str | Path, properties: dict[str, TirProperty]) 
         if name not in properties:
             raise InputError(tir_path, f"[UNITS] {name}", None, f"is missing: write {name} = '{allowed[0]}'")
         if properties[name].text.lower() not in allowed:
-            raise _wrong_value(tir_path, properties, name, f"must be '{allowed[0]}'")
-    if "FITTYP" in properties and _number_of(tir_path, properties, "FITTYP") not in FITTYP_VERSIONS:
-        raise _wrong_value(
+            raise _wrong_value_error(tir_path, properties, name, f"must be '{allowed[0]}'")
+    if "FITTYP" in properties and _number_of_key(tir_path, properties, "FITTYP") not in FITTYP_VERSIONS:
+        raise _wrong_value_error(
             tir_path,
             properties,
             "FITTYP",
@@ -136,17 +136,17 @@ def _check_properties(tir_path: str | Path, properties: dict[str, TirProperty]) 
             raise InputError(tir_path, name, None, "is missing; needed are " + ", ".join(NEEDED_KEYS))
 
 
-def _number_of(tir_path: str | Path, properties: dict[str, TirProperty], key_name: str) -> float:
+def _number_of_key(tir_path: str | Path, properties: dict[str, TirProperty], key_name: str) -> float:
     try:
         value = float(properties[key_name].text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise _wrong_value(tir_path, properties, key_name, "must be a finite number")
+        raise _wrong_value_error(tir_path, properties, key_name, "must be a finite number")
     return value
 
 
-def _wrong_value(
+def _wrong_value_error(
     tir_path: str | Path, properties: dict[str, TirProperty], key_name: str, allowed_text: str
 ) -> InputError:
     return InputError(

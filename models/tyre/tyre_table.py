@@ -155,7 +155,7 @@ def _interpolate_axis(table_values: np.ndarray, axis: int, old_nodes: np.ndarray
     return (1.0 - share) * values_below + share * values_above
 
 
-class Tables(NamedTuple):
+class StackedTyreTables(NamedTuple):
     """Tables of t tyres on common nodes, for compiled functions: mu_x (t, a, f, s), g (t, a, s), h (t, a, f)."""
 
     angles: np.ndarray
@@ -176,15 +176,17 @@ class TableCell(NamedTuple):
     load_share: float
 
 
-def stacked_tables(tyre_tables: Sequence[TyreTable]) -> Tables:
-    """``Tables`` of several tyres on the union of their nodes, which does not change their interpolated values."""
+def stacked_tables(tyre_tables: Sequence[TyreTable]) -> StackedTyreTables:
+    """``StackedTyreTables`` of several tyres on the union of their nodes, which does not change their interpolated
+    values.
+    """
     if not tyre_tables:
         raise InputError("", "tyres", [], "needs at least one table")
     nodes = [
         np.unique(np.concatenate([getattr(t, name) for t in tyre_tables])) for name in ("angles", "slips", "loads")
     ]
     fine = [t.refined(*nodes) for t in tyre_tables]
-    return Tables(*nodes, *(np.stack([getattr(t, name) for t in fine]) for name in ("mu_x", "g", "h")))
+    return StackedTyreTables(*nodes, *(np.stack([getattr(t, name) for t in fine]) for name in ("mu_x", "g", "h")))
 
 
 @lean
@@ -208,8 +210,9 @@ def cell_and_share(table_nodes, node_value):
 
 @lean
 def lateral_adhesion(table_index, table_cell, slip_cell, slip_share, slip_factors, angle_factors):
-    """Lateral friction coefficient mu_y of a table at the slip angle and load of ``table_cell``, and at the slip in cell k
-    with relative position w."""
+    """Lateral friction coefficient mu_y of a table at the slip angle and load of ``table_cell``, and at the slip in
+    cell k with relative position w.
+    """
     i, p, j, q = table_cell
     i1, j1, k1 = (
         min(i + 1, angle_factors.shape[1] - 1),
@@ -231,7 +234,9 @@ def lateral_adhesion(table_index, table_cell, slip_cell, slip_share, slip_factor
 
 @lean
 def longitudinal_adhesion(table_index, table_cell, slip_node, mu_x):
-    """Longitudinal friction coefficient mu_x of a table at the slip angle and load of ``table_cell``, and at slip node k."""
+    """Longitudinal friction coefficient mu_x of a table at the slip angle and load of ``table_cell``, and at slip
+    node k.
+    """
     i, p, j, q = table_cell
     i1, j1 = min(i + 1, mu_x.shape[1] - 1), min(j + 1, mu_x.shape[2] - 1)
     if q == 0.0:

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from models.core.discretisation import not_estimated
-from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
+from models.rail.contact_point import LEFT, RIGHT, ConicalWheel, cone_on_rail
 from models.rail.equations import ROLL, YAW, WheelsetPath, Y, Z
 from models.rail.joint_forces import JOINTS, joints_from_states
-from models.rail.profile_contact import Pose
+from models.rail.profile_contact import WheelPose
 from models.rail.wheelset import CHOSEN_WHEELSET, Wheelset
 from models.systems.wheelset.of_scene import equations_and_start
 from models.systems.wheelset.run import run as simulate
@@ -88,8 +88,10 @@ def force_arrows(wheelset: Wheelset, wheelset_run: WheelsetPath) -> tuple[ForceA
     """Force arrows of the normal force and the creep force on both wheels, at the contact points along a run."""
     drawn_arrows = []
     for k, (name, side) in enumerate(SIDE_SIGNS.items()):
-        cone = Cone(wheelset.radius, wheelset.half_gauge, wheelset.conicity, wheelset.head_radius)
-        touched = [cone_on_rail(side, Pose(*state[[Y, Z, ROLL, YAW]].tolist()), cone) for state in wheelset_run.states]
+        cone = ConicalWheel(wheelset.radius, wheelset.half_gauge, wheelset.conicity, wheelset.head_radius)
+        touched = [
+            cone_on_rail(side, WheelPose(*state[[Y, Z, ROLL, YAW]].tolist()), cone) for state in wheelset_run.states
+        ]
         points = np.array(touched)[:, -3:] + wheelset_run.states[:, [Y, Z]] @ np.eye(3)[1:]  # in the track's axes
         contact = wheelset_run.contacts[:, k]
         sine, cosine, zeros = np.sin(contact["angle"]), np.cos(contact["angle"]), 0.0 * contact["angle"]

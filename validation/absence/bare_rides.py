@@ -11,7 +11,7 @@ from models.engines.assembly import Settings
 from models.engines.protocol import guard
 from models.engines.spatial_protocol import INTEGRATORS, build
 from models.machine.timing import interleave, paired_ratio
-from models.ride.copies_kernel import POWERS_SUMMED, march
+from models.ride.copies_kernel import POWERS_SUMMED, march_copies
 from models.ride.nonlinear_copies import force_laws
 from models.ride.road_path import RoadPath, road_path
 from models.systems.ride.of_scene import excitation_of, vehicle_of
@@ -75,7 +75,7 @@ def copy_runs(step_count: int) -> tuple[Job, Job]:
 
     def run_twinrig() -> np.ndarray:
         states = np.zeros((2 * len(plain.mass), COPIES))
-        march(states, roads, road.step, step_count, 1, laws, sums)
+        march_copies(states, roads, road.step, step_count, 1, laws, sums)
         return states
 
     def run_hand_built() -> np.ndarray:

@@ -70,7 +70,7 @@ def _counts_of_run(vehicle: Any, controller: Any) -> dict[str, int]:
         "coordinates": len(vehicle.coordinates),
         "wheels": plane.wheels,
         "lags": 0 if vehicle.relaxation is None else vehicle.relaxation.size,
-        "moving loads": int(((plane.by_x != 0.0) | (plane.by_y != 0.0)).sum()),
+        "moving loads": int(((plane.load_per_x_acceleration != 0.0) | (plane.load_per_y_acceleration != 0.0)).sum()),
         "time constants": int((chambers.fill_time > 0.0).sum() + (chambers.empty_time > 0.0).sum()),
         "kept commands": (len(air_at_rest(chambers, vehicle.sample).commands) - 2) * plane.wheels,
         "slow fillings": chambers.slow.size,

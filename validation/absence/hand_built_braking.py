@@ -38,7 +38,7 @@ class Truck(NamedTuple):
     spin_inertia: np.ndarray
     mass: float
     yaw_inertia: float
-    tables: Tables
+    tables: StackedTyreTables
     cosine: float
     sine: float
 
@@ -332,9 +332,9 @@ def run(vehicle: Any, speed: float, steer: float, sample_limit: int) -> Callable
     truck = Truck(
         plane.place[:, 0].copy(),
         plane.place[:, 1].copy(),
-        plane.static,
+        plane.static_loads,
         plane.radius,
-        plane.spin,
+        plane.spin_inertia,
         plane.masses[0],
         plane.inertias[0],
         vehicle.tables,

@@ -24,7 +24,7 @@ from models.machine.records import records, size_of, stacked
 from models.machine.stack import array, beyond, doubles, row
 from models.multibody.numbers import Handling
 from models.multibody.tree import cross, dot, plus, three, times
-from models.tyre.bristles import SECOND_ORDER_MARCH, THREE_BRISTLES, cornering_stiffness_factor, net
+from models.tyre.bristles import SECOND_ORDER_MARCH, THREE_BRISTLES, cornering_stiffness_factor, patch_grid
 from models.vehicles.free_vehicle import ROTOR_MASS
 
 COORDINATE_COUNT, CELLS = 23, 21
@@ -224,7 +224,7 @@ def _add_seat_forces(seat_parameters, chassis_frame, q, v, forces_out):
 def parameter_table(handling_car: Handling) -> np.ndarray:
     """The car's parameters as one array: general ones, then parameters of the wheels, the engine mounts, the seats and
     the grid of the contact patch."""
-    car, contact_net, preload_of = handling_car.vehicle, net(CELLS), handling_car.held.parts
+    car, contact_net, preload_of = handling_car.vehicle, patch_grid(CELLS), handling_car.held.parts
     springs, s, joint = {p.name: p for p in car.springs}, car.body("sway").position, car.body("engine").position
     bars = [number for bar in car.bars for number in (bar.stiffness, preload_of[bar.name], 1.0 / bar.track)]
     head = [

@@ -14,12 +14,12 @@ import numpy as np
 from models.contact.linear_theory import coefficient_at
 from models.machine.compiled import lean, njit
 from models.machine.records import size_of
-from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
-from models.rail.profile_contact import Pose, normal_force_and_axes
-from models.rail.wheel_forces import REPORT, rails_of
+from models.rail.contact_point import LEFT, RIGHT, ConicalWheel, cone_on_rail
+from models.rail.profile_contact import WheelPose, normal_force_and_axes
+from models.rail.wheel_forces import REPORT_RECORD, rails_of
 
 STATE_COUNT = 10
-REPORT_LENGTH = size_of(REPORT)
+REPORT_LENGTH = size_of(REPORT_RECORD)
 
 
 @lean
@@ -30,14 +30,14 @@ def rates(wheelset_state, speed, parameters, fills_report, state_rate, contact_r
     modulus, Poisson's ratio.
     """
     mass, spin_inertia, cross_inertia, carried, radius, gauge, conicity, head, modulus, shear, poisson = parameters
-    cone = Cone(radius, gauge, conicity, head)
+    cone = ConicalWheel(radius, gauge, conicity, head)
     y, z, roll, yaw, _, y_rate, z_rate, roll_rate, yaw_rate, spin = wheelset_state
     cr, sr, cy, sy = np.cos(roll), np.sin(roll), np.cos(yaw), np.sin(yaw)
     turn_rate = spin - yaw_rate * sr
     wx, wy, wz = cy * roll_rate - sy * cr * turn_rate, sy * roll_rate + cy * cr * turn_rate, yaw_rate + sr * turn_rate
     fy = fz = mx = my = mz = 0.0
     for side in (RIGHT, LEFT):
-        depth, rolling, n_y, n_z, px, py, pz = cone_on_rail(side, Pose(y, z, roll, yaw), cone)
+        depth, rolling, n_y, n_z, px, py, pz = cone_on_rail(side, WheelPose(y, z, roll, yaw), cone)
         load, a, b = normal_force_and_axes(
             depth, 0.5 / (rolling * np.sqrt(1.0 + conicity * conicity)), 0.5 / head, modulus
         )
@@ -125,6 +125,6 @@ def run(wheelset: Any, wheelset_state: np.ndarray, speed: float, step: float, st
     def run_wheelset() -> tuple[np.ndarray, np.ndarray]:
         path, reports = np.empty((step_count + 1, STATE_COUNT)), np.empty((step_count + 1, 2, REPORT_LENGTH))
         march(wheelset_state, speed, step, p, path, reports)
-        return path, reports.view(REPORT)[..., 0]
+        return path, reports.view(REPORT_RECORD)[..., 0]
 
     return run_wheelset

@@ -13,7 +13,7 @@ import numpy as np
 from models.rail import equations as eq
 from models.rail import wheel_forces as forces
 from models.rail.eigenvalues import free_wheelset
-from models.rail.equations import Equations
+from models.rail.equations import WheelsetEquations
 from models.rail.wheelset import CHOSEN_WHEELSET, Wheelset
 from models.systems.wheelset.scene import WheelsetScene
 from validation.common.rows import Row, System, behaviour_row
@@ -59,11 +59,11 @@ def counts_and_path(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], 
 def rates_with_nan_grid(creep_law: Any) -> str:
     """Returns "the same" if filling FASTSIM's grid with NaN does not change a bit of the wheelset's state rates, else
     "no numbers"."""
-    equations = Equations(CHOSEN_WHEELSET, SPEED, creep_law, 11)
+    equations = WheelsetEquations(CHOSEN_WHEELSET, SPEED, creep_law, 11)
     state, (speed, body, _), rails = equations.displaced_state(LATERAL_SHIFT), equations.parameters, equations.rails
     rails = rails._replace(strips=np.full_like(rails.strips, np.nan), cells=np.full_like(rails.cells, np.nan))
     rates = np.empty(eq.STATE_COUNT)
-    eq.rates(state, speed, body, forces.plain_rails(rails), rates, equations.empty_contacts())
+    eq.fill_rates(state, speed, body, forces.plain_rails(rails), rates, equations.empty_contacts())
     return "the same" if rates.tobytes() == equations.rates(state).tobytes() else "no numbers"
 
 

@@ -10,11 +10,14 @@ from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, PlaneVehicle, plane
 from models.brake.surfaces import UNIFORM_ROAD, RoadSurfaces, VehicleOnRoad
 from models.core.errors import RunFailed
 from models.tyre.magic_formula import table_of_surface
-from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
+from models.tyre.tyre_table import StackedTyreTables, TyreTable, stacked_tables
 
 
 def on_road(
-    plane_vehicle: PlaneVehicle, tyre_tables: Tables, road: RoadSurfaces = UNIFORM_ROAD, cornering_slope: float = 10.0
+    plane_vehicle: PlaneVehicle,
+    tyre_tables: StackedTyreTables,
+    road: RoadSurfaces = UNIFORM_ROAD,
+    cornering_slope: float = 10.0,
 ) -> VehicleOnRoad:
     """A plane_vehicle vehicle on a road, all of its wheels with the same tyre. cornering_slope: cornering cornering_slope of its friction
     (1/rad)."""
@@ -93,12 +96,14 @@ LOCKING_TORQUE = 1e9
 """Torque (N m) that locks a wheel at once."""
 
 
-def truck_on_tables(tyre_tables: Tables | None = None, plane_vehicle: PlaneVehicle = PAPER_PLANE) -> VehicleOnRoad:
+def truck_on_tables(
+    tyre_tables: StackedTyreTables | None = None, plane_vehicle: PlaneVehicle = PAPER_PLANE
+) -> VehicleOnRoad:
     """The paper's truck on ice, or on other tyre tables with the cornering slope of ice."""
     return on_road(plane_vehicle, tyre_tables or stacked_tables([ICE_TABLE]), cornering_slope=ICE_TABLE.cornering)
 
 
-def constant_friction(friction_coefficient: float) -> Tables:
+def constant_friction(friction_coefficient: float) -> StackedTyreTables:
     """Tyre tables whose friction coefficient is the given one at every slip above 0.1."""
     flat = np.broadcast_to(np.array([0.0, friction_coefficient, friction_coefficient]), (3, 1, 3)).copy()
     nodes = np.array([0.0, 0.1, np.pi / 2.0]), np.array([0.0, 0.1, 1.0]), np.array([1e4])
@@ -116,7 +121,7 @@ def transfer_errors(friction_coefficient: float = 0.4) -> dict[str, float]:
     axle, and the axles' loads change by m z g h / E.
     """
     lift = PAPER_TRUCK.height / PAPER_TRUCK.wheelbase
-    light, static = PAPER_PLANE._replace(spin=np.full(4, 1e-9)), PAPER_PLANE.static.reshape(2, 2).sum(1)
+    light, static = PAPER_PLANE._replace(spin_inertia=np.full(4, 1e-9)), PAPER_PLANE.static_loads.reshape(2, 2).sum(1)
     slowing = {
         "all wheels": friction_coefficient * GRAVITY,
         "front wheels": friction_coefficient * static[0] / (PAPER_TRUCK.mass * (1.0 - friction_coefficient * lift)),

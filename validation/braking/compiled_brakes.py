@@ -20,8 +20,8 @@ from models.engines.braking_sprung import driven_vehicle
 from models.engines.free_vehicle import FreeModel, free_model
 from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import (
+    StackedTyreTables,
     TableCell,
-    Tables,
     cell_and_share,
     lateral_adhesion,
     longitudinal_adhesion,
@@ -33,7 +33,11 @@ DRY_TABLES = stacked_tables([table_of_surface("dry")])
 
 
 def tyre(
-    tyre_tables: Tables, surface: WheelSurface, wheel_motion: WheelMotion, load: float, braked_step: BrakedStep
+    tyre_tables: StackedTyreTables,
+    surface: WheelSurface,
+    wheel_motion: WheelMotion,
+    load: float,
+    braked_step: BrakedStep,
 ) -> np.ndarray:
     """Report (7,) of a tyre after a step, by compiled code: the same values as by
     ``models.brake.plain.tyre.tyre_report``.
@@ -71,7 +75,9 @@ def tyre(
     return report[:, 0]
 
 
-def friction(tyre_tables: Tables, table_index: int, slip_angle: float, load: float, slip: float) -> tuple[float, float]:
+def friction(
+    tyre_tables: StackedTyreTables, table_index: int, slip_angle: float, load: float, slip: float
+) -> tuple[float, float]:
     """Friction coefficients mu_x and mu_y, by compiled code, of a tyre table at a slip angle (rad), a load (N) and a
     slip."""
     cells, (s, w) = (

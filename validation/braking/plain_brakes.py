@@ -15,7 +15,7 @@ from models.brake.plain import tyre as plain_tyre
 from models.brake.pressure import AirState, BrakeChambers, advance_by_pressures, advance_by_valves, air_at_rest
 from models.brake.surfaces import RoadStretch, RoadSurfaces, road_of_stretches
 from models.tyre.magic_formula import table_of_surface
-from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
+from models.tyre.tyre_table import StackedTyreTables, TyreTable, stacked_tables
 from validation.braking import compiled_brakes as compiled
 from validation.braking.compiled_brakes import PAPER_PLANE
 from validation.braking.plain_relaxation import lag_on as plain_lag_on
@@ -34,7 +34,7 @@ def load_dependent_tyre(surface_name: str) -> TyreTable:
     return replace(spread, mu_x=spread.mu_x * FRICTION_BY_LOAD[None, :, None], h=spread.h * FRICTION_BY_LOAD)
 
 
-def tables() -> Tables:
+def tables() -> StackedTyreTables:
     """Tyre tables of three surfaces, each at several loads, stacked for compiled functions."""
     return stacked_tables([load_dependent_tyre(name) for name in ("dry", "wet", "ice")])
 
@@ -155,7 +155,7 @@ def friction_of_random_states(state_count: int = STATE_COUNT, seed: int = SEED) 
         tyre_index, angle, load = int(random.integers(len(tyres))), random.uniform(0.0, 1.7), random.uniform(0.0, 12e3)
         slip, chosen = random.uniform(), tyres[tyre_index]
         coefficients[i] = compiled.friction(all_tables, tyre_index, angle, load, slip)
-        single_tables = Tables(
+        single_tables = StackedTyreTables(
             chosen.angles, chosen.slips, chosen.loads, chosen.mu_x[None], chosen.g[None], chosen.h[None]
         )
         friction = plain_tyre.TyreFriction(single_tables, plain_tyre.WheelSurface(0, 0, 0.0), angle, load)

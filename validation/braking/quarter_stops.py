@@ -17,7 +17,7 @@ from models.brake.quarter import QuarterStop, QuarterVehicle, stop_of_quarter_ve
 from models.brake.surfaces import UNIFORM_ROAD
 from models.machine.compiled import njit
 from models.tyre.magic_formula import table_of_surface
-from models.tyre.tyre_table import Tables, TyreTable, cell_and_share, stacked_tables
+from models.tyre.tyre_table import StackedTyreTables, TyreTable, cell_and_share, stacked_tables
 
 EULER, RK4, LITERAL = "explicit Euler", "RK4", "paper's, literal"
 SCHEMES = (EULER, RK4, LITERAL)
@@ -201,7 +201,7 @@ PAPER_STEP = 5.5e-3
 
 
 @cache
-def friction_table(surface_name: str, friction_scale: float = 1.0) -> tuple[TyreTable, Tables]:
+def friction_table(surface_name: str, friction_scale: float = 1.0) -> tuple[TyreTable, StackedTyreTables]:
     """Tyre table of a surface, as an object and in the form for compiled functions."""
     tyre = table_of_surface(surface_name, friction_scale)
     return tyre, stacked_tables([tyre])
@@ -215,7 +215,7 @@ def steady_torque(quarter_car: QuarterVehicle, tyre_table: TyreTable, slip: floa
 
 def constant_torque_stop(
     quarter_car: QuarterVehicle,
-    tyre_table: tuple[TyreTable, Tables],
+    tyre_table: tuple[TyreTable, StackedTyreTables],
     brake_torque: float,
     speed: float,
     time_step: float = PAPER_STEP,

@@ -9,8 +9,8 @@ import numpy as np
 from models.bicycle.ideal_rolling import IdealBicycle
 from models.bicycle.rolling_tyres import BicycleTyre, RollingBicycle
 from models.bicycle.suspects import forecast_deviations, predicted_weave, ranked_suspects
-from models.bicycle.weave import Observation, observations
-from models.bicycle.whipple import Control, Whipple, load_bicycle
+from models.bicycle.weave import WeaveObservation, read_observations
+from models.bicycle.whipple import SteeringControl, Whipple, load_bicycle
 from models.core.errors import RunFailed
 from models.identification.subsets import SubsetChoice
 from models.systems.bicycle.run import engine_eigenvalues, run
@@ -25,7 +25,7 @@ TYRE_STIFFNESS_FACTORS = (4.0, 16.0, 64.0, 256.0)
 """Factors by which the tyres are stiffer than usual."""
 EIGENVALUE_SPEED = 5.0
 """Speed (m/s) at which eigenvalues of the bicycle on tyres are compared."""
-MEASURED_FEEDBACK = Control(gain=2.0)
+MEASURED_FEEDBACK = SteeringControl(gain=2.0)
 """Feedback control of the measured bicycle."""
 LOWEST_JUDGED_SPEED = 2.0
 """Lowest speed (m/s) at which the predicted weave damping, with nothing fitted, must meet the measured one."""
@@ -187,7 +187,7 @@ def _measured_bicycle_rows(quick: bool) -> tuple[list[Row], list[list[str]]]:
     if folder is None or not (folder / "windows.csv").is_file():
         why = "TWINRIG_DATA names no folder with bicycle/windows.csv"
         return [not_run("bicycle.measured", SYSTEM, "weave of a measured bicycle", why)], []
-    bicycle, seen = load_bicycle("steer_by_wire"), observations(folder)
+    bicycle, seen = load_bicycle("steer_by_wire"), read_observations(folder)
     rows, table = [], []
     for observation in seen:
         rows += _unfitted_prediction_rows(bicycle, observation)
@@ -201,7 +201,7 @@ def _measured_bicycle_rows(quick: bool) -> tuple[list[Row], list[list[str]]]:
     return [*rows, *_suspect_parameter_rows(ranked_suspects(bicycle, MEASURED_FEEDBACK, seen))], table
 
 
-def _unfitted_prediction_rows(bicycle: Whipple, weave_observation: Observation) -> list[Row]:
+def _unfitted_prediction_rows(bicycle: Whipple, weave_observation: WeaveObservation) -> list[Row]:
     """Rows: weave at one speed predicted with nothing fitted, compared with the measured one."""
     model, mean, deviation = (
         predicted_weave(bicycle, MEASURED_FEEDBACK, weave_observation),
@@ -233,7 +233,7 @@ def _unfitted_prediction_rows(bicycle: Whipple, weave_observation: Observation) 
 
 
 def _fitted_prediction_rows(
-    bicycle: Whipple, parameter_choice: SubsetChoice, weave_observation: Observation
+    bicycle: Whipple, parameter_choice: SubsetChoice, weave_observation: WeaveObservation
 ) -> list[Row]:
     """Rows: weave at one speed predicted with parameters fitted to the other speeds, compared with the measured one."""
     gaps = forecast_deviations(bicycle, MEASURED_FEEDBACK, parameter_choice, weave_observation)
@@ -279,7 +279,7 @@ def _suspect_parameter_rows(parameter_choice: SubsetChoice) -> list[Row]:
 
 
 def _weave_table_line(
-    bicycle: Whipple, parameter_choice: SubsetChoice | None, weave_observation: Observation
+    bicycle: Whipple, parameter_choice: SubsetChoice | None, weave_observation: WeaveObservation
 ) -> list[str]:
     """Line of the table of measured and predicted weave at one speed."""
     model, mean, deviation = (

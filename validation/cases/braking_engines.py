@@ -16,7 +16,7 @@ from models.brake.pressure import BrakeChambers
 from models.brake.trailer import CHOSEN_TRAILER, plane_of_trailer, trailer_behind_hook
 from models.engines.braking import EngineChassis
 from models.systems.braking.march import braked_vehicle_on_tyres
-from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
+from models.tyre.tyre_table import StackedTyreTables, TyreTable, stacked_tables
 from validation.braking.braked_truck import (
     ICE_TABLE,
     PAPER_PLANE,
@@ -151,7 +151,7 @@ def _symmetry_rows(end_speed: float, steered_turn: TurnEnd) -> list[Row]:
     ]
 
 
-def lateral_tyre_tables(friction_slope: float) -> Tables:
+def lateral_tyre_tables(friction_slope: float) -> StackedTyreTables:
     """Tyre tables with lateral friction alone. Its coefficient rises with a slope (1/rad) up to a slip angle of 0.01
     rad."""
     mu = np.array([[0.0], [0.01 * friction_slope], [0.01 * friction_slope]])

@@ -19,7 +19,7 @@ import numpy as np
 import models.brake.port as port
 from models.brake.controller import SAMPLING_PERIOD, Controller, Sample
 from models.brake.port.ask import ControllerFailed, checked_command
-from models.brake.port.example import ExampleController
+from models.brake.port.example import Example
 from models.brake.port.setup import ControllerRunData, PortTable, controller_of_run
 from models.machine.timing import median
 from models.systems.braking.march import BrakingPath
@@ -31,7 +31,7 @@ from validation.common.rows import Observed, Row, System, Table, behaviour_row, 
 
 TITLE = "The controller port: same bits on every way, and controllers that fail"
 SYSTEM: System = "anti-lock"
-EXAMPLE_CONTROLLER = "models.brake.port.example:ExampleController"
+EXAMPLE_CONTROLLER = "models.brake.port.example:Example"
 SILENCE_TIMEOUT = 0.5
 """Time-out (s) for one command of a controller that falls silent. A run whose controller fails shall have ended within
 twice that time."""
@@ -201,8 +201,7 @@ def _exchange_times(
             if isinstance(table, dict)
         }
         controllers = {
-            name: stack.enter_context(controller_of_run(table, facts, ExampleController(4)))[0]
-            for name, table in tables.items()
+            name: stack.enter_context(controller_of_run(table, facts, Example(4)))[0] for name, table in tables.items()
         }
         for i in range(round_count):
             for name, controller in controllers.items():
@@ -301,12 +300,12 @@ class _ExchangeClock:
     def __enter__(self) -> "_ExchangeClock":
         from models.systems.braking import march
 
-        self.last_start, self._march, self._ask = time.perf_counter(), march, march.ask
-        march.ask = self._timed_ask  # type: ignore[assignment]
+        self.last_start, self._march, self._ask = time.perf_counter(), march, march.checked_command
+        march.checked_command = self._timed_ask  # type: ignore[assignment]
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._march.ask = self._ask
+        self._march.checked_command = self._ask
 
     def _timed_ask(self, controller: Controller, controller_input: Sample, *arguments: Any) -> Any:
         self.last_start = time.perf_counter()

@@ -10,7 +10,7 @@ from scipy.special import ellipk
 
 from models.core.errors import InputError
 from models.rail.equivalent_conicity import KlingelWave, equivalent_conicity, harmonic_linearised_conicity, klingel_wave
-from models.rail.laid_profiles import Profiles
+from models.rail.laid_profiles import CrossSections
 from models.rail.rolling_radius_table import RollingRadiusTable, rolling_radii_of
 from validation.common.rows import Observed, Row, System, not_run
 from validation.common.scenes import data_folder
@@ -213,7 +213,7 @@ def _harmonic_conicity(y: np.ndarray, radius_difference: np.ndarray, wave: Kling
 def _exchanged_wheels_rows() -> list[Row]:
     """Rows: conicity and centre of the wave for wheels of 920 and 918 mm diameter, compared with the mirror image with
     both wheels exchanged."""
-    profiles, y = Profiles(), np.arange(-8e-3, 8.0001e-3, 5e-4)
+    profiles, y = CrossSections(), np.arange(-8e-3, 8.0001e-3, 5e-4)
     large, small = profiles.wheel_on_rail(0.460), profiles.wheel_on_rail(0.459)
     there, back = (
         klingel_wave(rolling_radii_of(right, left, y), 3e-3) for right, left in ((large, small), (small, large))

@@ -21,7 +21,7 @@ from models.road.plane_waves import plane_waves
 from models.systems.handling.energy import drive_energy, unaccounted_energy
 from models.systems.handling.run import SimulatedDrive, drive_run, driven_model
 from models.systems.handling.single_track import steady_turn_gains
-from models.tyre.bristles import FIRST_FLEXIBILITY, brush_forces, net, tyre_forces
+from models.tyre.bristles import FIRST_FLEXIBILITY, brush_forces, patch_grid, tyre_forces
 from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.load_transfer import braked_error, sliding_car, turning_car, turning_error
 from validation.braking.sprung_box import box
@@ -380,7 +380,7 @@ def _timed_march(handling_car: Handling, step_count: int) -> Callable[[], Any]:
 
 def _repeat_four_tyres(repeat_count: int) -> None:
     """Evaluate the forces of four slightly slipping tyres a number of times."""
-    of = net(21)
+    of = patch_grid(21)
     contacts, forces = np.zeros((4, 10)), np.empty((4, 4))
     contacts[:, [A, B, LOAD, MU]] = 0.08, 0.09, 3000.0, 0.9
     contacts[:, FIRST_FLEXIBILITY:] = 2e-8

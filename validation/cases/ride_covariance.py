@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from models.ride.closed_forms import half_car_acceleration, split_half_car
+from models.ride.closed_forms import half_car_acceleration, quarter_cars_of_half_car
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
 from models.ride.frequency import variances_by_quadrature
 from models.ride.sweep import variance_sweep
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import CORRELATION_CASES, TwoTrackRoad, input_covariance, road_of_level
 from models.systems.ride.of_scene import linear_vehicle
@@ -117,7 +117,7 @@ def _quadrature_comparison(
 
 
 def _covariance_difference(
-    vehicle: LinearVehicle, analytic_vehicle: LinearVehicle, road_excitation: Excitation, speed: float
+    vehicle: LinearVehicle, analytic_vehicle: LinearVehicle, road_excitation: RoadExcitation, speed: float
 ) -> tuple[float, float, float, int]:
     """Largest relative difference between a vehicle's standard deviations by covariance and those by quadrature on the
     analytic vehicle, the error that each method states, and the number of outputs that do not vanish by symmetry."""
@@ -156,7 +156,7 @@ def _closed_form_rows() -> list[Row]:
         for key, value in worst.items()
     ]
     a, b, speeds = 1.2, 1.5, (3.0, 17.0, 50.0)
-    front, rear, inertia = split_half_car(QUARTER_CAR, a, b)
+    front, rear, inertia = quarter_cars_of_half_car(QUARTER_CAR, a, b)
     vehicle = quarter_car_vehicle([(a, front), (-b, rear)], np.diag([front.m_s + rear.m_s, inertia]))
     half = [stationary_covariance(vehicle_with_road(vehicle, one_track((a, -b)), v)).variance[0] for v in speeds]
     formula = [half_car_acceleration(QUARTER_CAR, v * ROAD_INTENSITY, a, b, v) for v in speeds]

@@ -12,7 +12,7 @@ from models.ride.covariance import stationary_covariance
 from models.ride.excited import DelayedSystem, vehicle_with_road
 from models.ride.frequency import output_densities, signed_wavenumbers, variances_over_wavenumbers
 from models.ride.weighting import WEIGHTINGS, system_with_weightings
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.road.isotropic import DensityTerm, IsotropicRoad, cross_spectrum_of, isotropic_road_like, spectral_matrix
 from models.road.two_track import (
     CORRELATION_CASES,
@@ -121,7 +121,7 @@ def _wheel_height_covariance_rows() -> list[Row]:
     ] + [_axle_distance_limit_row()]
 
 
-def wheel_heights_covariance(excitation: Excitation, speed: float = SPEED) -> np.ndarray:
+def wheel_heights_covariance(excitation: RoadExcitation, speed: float = SPEED) -> np.ndarray:
     """Covariance (w, w) in m^2 of the road heights under the w wheels, from the Lyapunov equation of the filters of all
     axles."""
     axles, C = np.eye(len(excitation.heights)), np.hstack(excitation.heights)

@@ -17,7 +17,7 @@ from models.ride.monte_carlo import variances_along_drive, variances_at_constant
 from models.ride.road_in_path import system_at_speed
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import LARGEST_RATE_TIMES_STEP, quasi_stationary, varying_speed
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
@@ -71,7 +71,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
 @cache
 def vehicle_and_road(
     vehicle_name: str, tyre_damping: float = 0.0, second_corner: float | None = None
-) -> tuple[LinearVehicle, Excitation]:
+) -> tuple[LinearVehicle, RoadExcitation]:
     """A shipped vehicle and the paper's road, which reaches the rear wheels with a delay. A vehicle without a track
     width has one track.
 
@@ -290,7 +290,7 @@ def _timed_call(timed_function: Callable[..., Any], *arguments: Any, **keywords:
 
 
 def deviation_by_adjoint(
-    vehicle: LinearVehicle, road_excitation: Excitation, speed_profile: SpeedProfile, output_name: str
+    vehicle: LinearVehicle, road_excitation: RoadExcitation, speed_profile: SpeedProfile, output_name: str
 ) -> float:
     """Standard deviation of one output at a drive's end by the adjoint equation, from the output's response to the road
     noise at each position.

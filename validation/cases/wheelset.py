@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from models.rail import equations as eq
-from models.rail.eigenvalues import largest_growth, wavelength
+from models.rail.eigenvalues import hunting_wavelength, largest_growth_rate
 from models.rail.energy import energy_ledger
-from models.rail.equations import Equations
-from models.rail.limit_cycle import Orbit, attained_cycle, guess_from_orbit, refined_orbit, solved_orbit
+from models.rail.equations import WheelsetEquations
+from models.rail.limit_cycle import Orbit, attained_limit_cycle, guess_from_orbit, refined_orbit, solved_orbit
 from models.rail.linear import NoCriticalSpeed, critical_speed, klingel_wavelength
 from models.rail.wheelset import CHOSEN_WHEELSET, Wheelset
 from models.systems.wheelset.of_scene import IMPLEMENTATION_MODULES, equations_class
@@ -79,12 +79,12 @@ def _wavelength_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     rails, with Klingel's formula."""
     closed, edges, among = [], [], []
     for wheelset in wheelsets.values():
-        waves = {engine: wavelength(equations_class(engine), wheelset) for engine in IMPLEMENTATION_MODULES}
+        waves = {engine: hunting_wavelength(equations_class(engine), wheelset) for engine in IMPLEMENTATION_MODULES}
         closed.append(max(abs(wave / klingel_wavelength(wheelset) - 1.0) for wave in waves.values()))
         among.append(_relative_spread(waves.values()))
         edge = wheelset.changed(head_radius=EDGE_RAIL_HEAD_RADIUS)
         plain = 2.0 * np.pi * np.sqrt(edge.radius * edge.half_gauge / edge.conicity)
-        edges.append(abs(wavelength(Equations, edge) / plain - 1.0))
+        edges.append(abs(hunting_wavelength(WheelsetEquations, edge) / plain - 1.0))
     count = f"of {len(wheelsets)} wheelsets without suspension at 0.2 m/s"
     return [
         Observed(
@@ -204,7 +204,7 @@ def _simulation_rows(
             "fastsim",
             cell_count,
         )
-        step = _time_step_of_wheelset(Equations(*setup))
+        step = _time_step_of_wheelset(WheelsetEquations(*setup))
         for engine in IMPLEMENTATION_MODULES:
             equations = equations_class(engine)(*setup)
             paths[engine] = equations.run(equations.displaced_state(4e-3), DURATION, step)
@@ -243,7 +243,7 @@ def _simulation_rows(
     ]
 
 
-def _time_step_of_wheelset(equations: Equations) -> float:
+def _time_step_of_wheelset(equations: WheelsetEquations) -> float:
     """Time step (s) for the wheelset's fastest motion: TIME_STEP, or a smaller step that divides DURATION."""
     fastest = float(np.abs(np.linalg.eigvals(equations.state_matrix)).max())
     return DURATION / np.ceil(DURATION / min(TIME_STEP, 1.0 / fastest))
@@ -262,7 +262,9 @@ def _limit_cycles(
         if name != "chosen" and not 20.0 < (critical_speed_table[name]["reference"] or 0.0) < 160.0:
             continue
         setup: tuple[Any, ...] = (wheelset, _travel_speed_of_simulation(critical_speed_table, name), "fastsim", 11)
-        first = attained_cycle(Equations(*setup), time_step=_time_step_of_wheelset(Equations(*setup)))
+        first = attained_limit_cycle(
+            WheelsetEquations(*setup), time_step=_time_step_of_wheelset(WheelsetEquations(*setup))
+        )
         if first is not None:
             guesses = {engine: guess_from_orbit(first, equations_class(engine)(*setup)) for engine in engine_names}
             cycles[name] = {
@@ -300,7 +302,7 @@ def _limit_cycle_rows(limit_cycles: dict[str, dict[str, Orbit]]) -> list[Row]:
 
 def _convergence_order_row() -> Row:
     """Row: observed order of RK4 with linear creep, from three steps."""
-    equations = Equations(CHOSEN_WHEELSET, 60.0, "linear")
+    equations = WheelsetEquations(CHOSEN_WHEELSET, 60.0, "linear")
     start = equations.displaced_state(5e-3)
     ends = [equations.run(start, 0.1, step).states[-1] for step in (1.25e-4, 6.25e-5, 3.125e-5)]
     first, second = np.abs(ends[0] - ends[1])[eq.YAW], np.abs(ends[1] - ends[2])[eq.YAW]
@@ -318,7 +320,7 @@ def _energy_rows() -> list[Row]:
     step, for both creep laws."""
     rows = list[Row]()
     for law, named in (("linear", "linear creep"), ("fastsim", "FASTSIM (11 cells)")):
-        equations = Equations(CHOSEN_WHEELSET, 60.0, law, 11)  # type: ignore[arg-type]
+        equations = WheelsetEquations(CHOSEN_WHEELSET, 60.0, law, 11)  # type: ignore[arg-type]
         left = []
         for step in (TIME_STEP, TIME_STEP / 2.0, TIME_STEP / 4.0):
             book = energy_ledger(equations, equations.run(equations.displaced_state(5e-3), 0.1, step))
@@ -344,14 +346,15 @@ def _energy_rows() -> list[Row]:
 
 def _planted_fault_rows() -> list[Row]:
     """Rows: a small fault planted in one implementation must exceed the tolerances of the other rows."""
-    equations, engine = Equations(CHOSEN_WHEELSET, 60.0), equations_class("mujoco")(CHOSEN_WHEELSET, 60.0)
+    equations, engine = WheelsetEquations(CHOSEN_WHEELSET, 60.0), equations_class("mujoco")(CHOSEN_WHEELSET, 60.0)
     state = equations.displaced_state(3e-3)
     right = largest_relative_difference(engine.rates(state), equations.rates(state))
     with faults.creep_law_patch(faults.spin_reversed)()():
         spin = largest_relative_difference(engine.rates(state), equations.rates(state))
     softer = CHOSEN_WHEELSET.changed(stiffness_x=0.99 * CHOSEN_WHEELSET.stiffness_x)
     stiff, changed = (
-        critical_speed(wheelset, partial(largest_growth, Equations)) for wheelset in (CHOSEN_WHEELSET, softer)
+        critical_speed(wheelset, partial(largest_growth_rate, WheelsetEquations))
+        for wheelset in (CHOSEN_WHEELSET, softer)
     )
     seen = {"sign of the spin": right < 1e-10 < spin, "1 % of a stiffness": abs(changed / stiff - 1.0) > 1e-6}
     return [

@@ -51,7 +51,7 @@ class TheoryErrors:
     moment: Array
     error: Array
     moment_error: Array
-    spin_weight_of_motion: Array
+    spin_share: Array
     group_number: Array
 
     @property

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 from scipy.optimize import brentq
 
-from models.rail.eigenvalues import free_wheelset, largest_growth
+from models.rail.eigenvalues import free_wheelset, largest_growth_rate
 from models.rail.linear import LOWEST_SPEED, critical_speed_or_reason
 from models.rail.wheelset import CHOSEN_WHEELSET, GRAVITY, Wheelset
 from models.systems.wheelset.of_scene import IMPLEMENTATION_MODULES, equations_class
@@ -58,7 +58,7 @@ def critical_speeds(wheelset: Wheelset, search_nearby: bool) -> dict[str, float 
     engines search near the reference's critical speed."""
     speeds: dict[str, float | None] = {}
     for engine in IMPLEMENTATION_MODULES:
-        of, first = partial(largest_growth, equations_class(engine)), speeds.get("reference")
+        of, first = partial(largest_growth_rate, equations_class(engine)), speeds.get("reference")
         speeds[engine] = (
             _critical_speed_near(partial(of, wheelset), first)
             if search_nearby and first

@@ -12,7 +12,7 @@ from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
 from models.contact.inputs import Array
-from models.rail.profile_contact import SHARPEST_CURVATURE, TOUCH, LaidProfile, Pose
+from models.rail.profile_contact import SHARPEST_CURVATURE, TOUCH_RECORD, LaidProfile, WheelPose
 from validation.contact.plain_fastsim import hertz_ellipse
 
 LOAD_TOLERANCE = 1e-12
@@ -25,7 +25,7 @@ def right_rail_depth(laid_profile: LaidProfile) -> PPoly:
     return PPoly(np.array([knots[name][:-1] for name in ("c3", "c2", "c1", "c0")]), knots["y"], extrapolate=False)
 
 
-def circle_contacts(wheel_side: int, wheelset_pose: Pose, laid_profile: LaidProfile) -> tuple[Array, Array, Array]:
+def circle_contacts(wheel_side: int, wheelset_pose: WheelPose, laid_profile: LaidProfile) -> tuple[Array, Array, Array]:
     """For each circle of the wheel: penetration (n,), and its nearest point relative to the wheelset's centre and the
     rail's normal there, both (n, 3)."""
     head, nodes, rail = laid_profile.head[0], laid_profile.nodes, right_rail_depth(laid_profile)
@@ -44,12 +44,14 @@ def circle_contacts(wheel_side: int, wheelset_pose: Pose, laid_profile: LaidProf
     return np.where(np.isfinite(depth), depth, -1.0), points, normals
 
 
-def contacts_of_wheel(wheel_side: int, wheelset_pose: Pose, laid_profile: LaidProfile, contact_modulus: float) -> Array:
+def contacts_of_wheel(
+    wheel_side: int, wheelset_pose: WheelPose, laid_profile: LaidProfile, contact_modulus: float
+) -> Array:
     """Contact patches of a wheel, records TOUCH (zones,); contact_modulus: contact modulus E* (Pa)."""
     depth, points, normals = circle_contacts(wheel_side, wheelset_pose, laid_profile)
     zone, length = laid_profile.nodes["zone"], np.arange(depth.size) * laid_profile.head[0].spacing
     radial = Rotation.from_euler("ZX", [wheelset_pose.yaw, wheelset_pose.roll]).as_matrix()[:, 2]
-    touches = np.zeros(int(laid_profile.head[0].zones), TOUCH)
+    touches = np.zeros(int(laid_profile.head[0].zones), TOUCH_RECORD)
     for k, touch in enumerate(touches):
         weight = np.maximum(1.0 - np.abs(zone - k), 0.0) * np.maximum(depth, 0.0) ** 2
         if not weight.any():

@@ -221,15 +221,18 @@ FAULTS = (
         "step",
         attribute_patch("validation.braking.quarter_stops:constant_torque_stop", _force_of_step_start),
     ),
-    CampaignFault("load transfer with the other sign", "vehicle", _truck_patch(by_x=np.negative)),
-    CampaignFault("roll transfer with the other sign", "vehicle", _truck_patch(by_y=np.negative)),
+    CampaignFault("load transfer with the other sign", "vehicle", _truck_patch(load_per_x_acceleration=np.negative)),
+    CampaignFault("roll transfer with the other sign", "vehicle", _truck_patch(load_per_y_acceleration=np.negative)),
     CampaignFault("left and right swapped", "vehicle", _truck_patch(place=lambda p: p * np.array([1.0, -1.0]))),
     CampaignFault("track halved", "vehicle", _truck_patch(place=lambda p: p * np.array([1.0, 0.5]))),
     CampaignFault("yaw inertia 1 % too large", "vehicle", _truck_patch(inertias=lambda inertia: 1.01 * inertia)),
     CampaignFault(
         "height of the centre of mass 1 % too large",
         "vehicle",
-        _truck_patch(by_x=lambda transfer: 1.01 * transfer, by_y=lambda transfer: 1.01 * transfer),
+        _truck_patch(
+            load_per_x_acceleration=lambda transfer: 1.01 * transfer,
+            load_per_y_acceleration=lambda transfer: 1.01 * transfer,
+        ),
     ),
     CampaignFault("spin inertia 1 % too large", "wheel", _spin_inertia_patch(1.01)),
     CampaignFault(

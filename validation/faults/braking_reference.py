@@ -13,7 +13,7 @@ from models.multibody import forces as at
 from models.multibody.numbers import Handling
 from models.multibody.parts import DAMPING, FRICTION, ON_TRAVEL, PER_PART, STIFFNESS
 from models.multibody.tree import LOCAL, PER_POINT
-from models.tyre.tyre_table import Tables
+from models.tyre.tyre_table import StackedTyreTables
 from models.vehicles.spatial_linear import Preloads
 from validation.braking import plain_brakes as laws
 from validation.braking import plain_sprung as whole
@@ -179,7 +179,7 @@ def _forces_exchanged(march_function: Any, engine_model: Any, *state: np.ndarray
     return march_function(engine_model, *state)
 
 
-def _stacked_tables_patch(change_friction: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Patch:
+def _stacked_tables_patch(change_friction: Callable[[StackedTyreTables], tuple[np.ndarray, np.ndarray]]) -> Patch:
     """Patch that replaces longitudinal friction mu_x and lateral friction h in the stacked tyre tables for compiled
     code."""
 
@@ -189,9 +189,11 @@ def _stacked_tables_patch(change_friction: Callable[[Tables], tuple[np.ndarray, 
     return attribute_patch("validation.braking.plain_brakes:stacked_tables", stack)
 
 
-def _with_friction(tyre_tables: Tables, change_friction: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Tables:
+def _with_friction(
+    tyre_tables: StackedTyreTables, change_friction: Callable[[StackedTyreTables], tuple[np.ndarray, np.ndarray]]
+) -> StackedTyreTables:
     mu_x, h = change_friction(tyre_tables)
-    return Tables(
+    return StackedTyreTables(
         tyre_tables.angles,
         tyre_tables.slips,
         tyre_tables.loads,
@@ -301,7 +303,9 @@ FAULTS = (
     CampaignFault("damping of a tyre 30 % too large", "table", _table_patch(_damped_tyre)),
     CampaignFault("stiffness of a tyre 1 % too small", "table", _table_patch(_softer_tyre)),
     CampaignFault(
-        "brake torque of the step's start", "step", attribute_patch("models.brake.samples:by_valves", _late_torque)
+        "brake torque of the step's start",
+        "step",
+        attribute_patch("models.brake.samples:advance_by_valves", _late_torque),
     ),
     CampaignFault("Euler's step for Runge and Kutta's", "step", _march_patch(_euler_step)),
     CampaignFault("moment on turning wheels 1 % too large", "step", _march_patch(_larger_spin_moment)),
@@ -309,10 +313,12 @@ FAULTS = (
     CampaignFault("slip angles that lag over half of each step", "lagging", _relaxation_patch(_lag_over_half_step)),
     CampaignFault("slip angles that lag by a speed 1 % too large", "lagging", _relaxation_patch(_faster_lag)),
     CampaignFault(
-        "brake torque 1 % too large", "brake", attribute_patch("models.brake.samples:by_valves", _larger_torque)
+        "brake torque 1 % too large", "brake", attribute_patch("models.brake.samples:advance_by_valves", _larger_torque)
     ),
     CampaignFault(
-        "valves that answer at once", "brake", attribute_patch(f"{PLAIN_BENCH_MODULE}:by_valves", _valves_without_delay)
+        "valves that answer at once",
+        "brake",
+        attribute_patch(f"{PLAIN_BENCH_MODULE}:advance_by_valves", _valves_without_delay),
     ),
     CampaignFault("cornering stiffness 30 % too large", "tyre", _stacked_tables_patch(lambda t: (t.mu_x, 1.3 * t.h))),
     CampaignFault(

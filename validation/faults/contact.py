@@ -185,14 +185,16 @@ FAULTS = (
         "sides of a cell exchanged",
         "normal problem",
         attribute_patch(
-            "models.contact.normal_problem:influence", lambda real: lambda x, y, dx, dy, pair: real(x, y, dy, dx, pair)
+            "models.contact.normal_problem:influence_of_rectangle",
+            lambda real: lambda x, y, dx, dy, pair: real(x, y, dy, dx, pair),
         ),
     ),
     CampaignFault(
         "influence of one body alone",
         "normal problem",
         attribute_patch(
-            "models.contact.normal_problem:influence", lambda real: lambda *arguments: 0.5 * real(*arguments)
+            "models.contact.normal_problem:influence_of_rectangle",
+            lambda real: lambda *arguments: 0.5 * real(*arguments),
         ),
     ),
     CampaignFault(
@@ -216,7 +218,7 @@ FAULTS = (
         "gradient of half the length",
         "exact theory",
         attribute_patch(
-            "models.contact.rolling_problem:UPSTREAM", lambda real: tuple(2.0 * arguments for arguments in real)
+            "models.contact.rolling_problem:ROLLING_WEIGHTS", lambda real: tuple(2.0 * arguments for arguments in real)
         ),
     ),
     CampaignFault(

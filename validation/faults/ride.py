@@ -14,7 +14,7 @@ from models.ride.excited import DelayedSystem
 from models.ride.frequency import variances_by_quadrature
 from models.ride.weighting import WEIGHTINGS, weighting_of_standard
 from models.road import two_track
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.vehicles import spatial_linear, vehicle_file
 from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition, eigenvalues
 from models.vehicles.spatial import SpatialVehicle
@@ -28,8 +28,8 @@ PUBLISHED_INERTIA = np.diag([207.26524557936952, 1565.8178787125541, 1791.599530
 
 
 def _system(
-    vehicle_name: str, road_of_vehicle: Callable[[LinearVehicle], Excitation]
-) -> tuple[LinearVehicle, Excitation, DelayedSystem]:
+    vehicle_name: str, road_of_vehicle: Callable[[LinearVehicle], RoadExcitation]
+) -> tuple[LinearVehicle, RoadExcitation, DelayedSystem]:
     from models.ride import excited
 
     vehicle = spatial_linear.linearise(vehicle_file.load_vehicle(vehicle_name))
@@ -37,7 +37,7 @@ def _system(
     return vehicle, met, excited.vehicle_with_road(vehicle, met, SPEED)
 
 
-def _single_track_road(vehicle: LinearVehicle) -> Excitation:
+def _single_track_road(vehicle: LinearVehicle) -> RoadExcitation:
     return two_track.road_excitation(two_track.road_of_level(1.0), two_track.wheels_on_track(vehicle.wheels, 1.0))
 
 
@@ -58,7 +58,7 @@ def _closed_form_error() -> float:
     """Relative error of the variance of the quarter car's body acceleration on a first-order road, against its closed
     form."""
     q, corner = 1e-4, 0.3
-    road = Excitation(np.array([[-corner]]), np.array([[q**0.5]]), (np.ones((1, 1)),), (0.0,))
+    road = RoadExcitation(np.array([[-corner]]), np.array([[q**0.5]]), (np.ones((1, 1)),), (0.0,))
     variance = stationary_covariance(_system("quarter_car", lambda vehicle: road)[2]).variance[0]
     car = QuarterCar(297.15222009894956, 31.8960913028392, 24453.137879749014, 1786.2441002440723, 158294.1398119115)
     return largest_relative_error(variance, car.body_acceleration_variance(q * SPEED, corner * SPEED))
@@ -303,7 +303,7 @@ FAULTS = (
     CampaignFault(
         "Wk: a section hears too little",
         "weighting",
-        attribute_patch("models.ride.weighting:Weighting.matrices", _missing_coupling),
+        attribute_patch("models.ride.weighting:FrequencyWeighting.matrices", _missing_coupling),
     ),
 )
 

@@ -14,9 +14,9 @@ from models.contact.linear_theory import linear_creep_forces as kalker
 from models.engines.wheelset import MujocoWheelset
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
-from models.rail.eigenvalues import wavelength
+from models.rail.eigenvalues import hunting_wavelength
 from models.rail.energy import energies_at_states, rates_and_powers
-from models.rail.equations import Equations
+from models.rail.equations import WheelsetEquations
 from models.rail.linear import klingel_wavelength
 from models.rail.wheelset import CHOSEN_WHEELSET
 from validation.common.checks import largest_relative_difference
@@ -37,9 +37,9 @@ HALF_DIFFERENCE_TIME = 1e-6
 """Half the time difference (s) over which energies are differentiated."""
 
 
-def equations(creep_law: CreepLaw = "fastsim") -> Equations:
+def equations(creep_law: CreepLaw = "fastsim") -> WheelsetEquations:
     """The reference's equations of the chosen wheelset, with few contact cells."""
-    return Equations(CHOSEN_WHEELSET, SPEED, creep_law, 7)
+    return WheelsetEquations(CHOSEN_WHEELSET, SPEED, creep_law, 7)
 
 
 @cache
@@ -132,7 +132,7 @@ CHECKS = {
         "Klingel's wavelength in closed form",
         "relative",
         1e-3,
-        lambda: abs(wavelength(Equations, CHOSEN_WHEELSET) / klingel_wavelength(CHOSEN_WHEELSET) - 1.0),
+        lambda: abs(hunting_wavelength(WheelsetEquations, CHOSEN_WHEELSET) / klingel_wavelength(CHOSEN_WHEELSET) - 1.0),
     ),
     "rest": Check("spin and load at rest", "relative", 1e-5, _spin_and_load_at_rest),
     "linear": Check("forces by Kalker's linear theory", "of the largest", 1e-9, _linear_law_error),
@@ -145,12 +145,13 @@ def plain_python_patch(**replaced_functions: Any) -> Patch:
     def prepare() -> Context:
         @contextmanager
         def context() -> Iterator[None]:
-            faulty_patches = with_globals(wf.patch_by_patch.py_func, **replaced_functions)
-            faulty = with_globals(wf.wheel_forces.py_func, LINEAR=None, patch_by_patch=faulty_patches)
+            faulty_patches = with_globals(wf.fill_forces_patch_by_patch.py_func, **replaced_functions)
+            faulty = with_globals(wf.fill_wheel_forces.py_func, LINEAR=None, fill_forces_patch_by_patch=faulty_patches)
             plain = {
-                name: getattr(eq, name).py_func for name in ("rates", "set_rates", "workspace_for", "rails_from_tuples")
+                name: getattr(eq, name).py_func
+                for name in ("fill_rates", "fill_rates_with_workspace", "workspace_for", "rails_from_tuples")
             }
-            with mock.patch.multiple(eq, wheel_forces=faulty, **plain):
+            with mock.patch.multiple(eq, fill_wheel_forces=faulty, **plain):
                 yield
 
         return context
@@ -164,11 +165,11 @@ def after_rates_patch(change_rates: Callable[..., None]) -> Patch:
     def with_change(original_function: Any) -> Any:
         def rates(wheelset_state: Any, speed: Any, body_parameters: Any, *further_arguments: Any) -> None:
             original_function(wheelset_state, speed, body_parameters, *further_arguments)
-            change_rates(wheelset_state, eq.Body(*body_parameters), further_arguments[-2])
+            change_rates(wheelset_state, eq.WheelsetBody(*body_parameters), further_arguments[-2])
 
         return rates
 
-    return attribute_patch("models.rail.equations:rates", with_change)
+    return attribute_patch("models.rail.equations:fill_rates", with_change)
 
 
 def creep_law_patch(change_inputs: Callable[[Any, Any], None], speed_factor: float = 1.0) -> Patch:
@@ -244,7 +245,7 @@ def _one_gyroscope(wheelset_state: Any, body_parameters: Any, state_rates: Any) 
 
 def _doubled_damping(original_function: Any) -> Any:
     def rates(wheelset_state: Any, speed: Any, body_parameters: Any, *further_arguments: Any) -> None:
-        body_record = eq.Body(*body_parameters)
+        body_record = eq.WheelsetBody(*body_parameters)
         x, y, z = body_record.damping
         original_function(
             wheelset_state, speed, tuple(body_record._replace(damping=(2.0 * x, 2.0 * y, 2.0 * z))), *further_arguments
@@ -269,7 +270,7 @@ FAULTS = (
     CampaignFault("no gyroscopic moments", "body", after_rates_patch(_no_gyroscope)),
     CampaignFault("one gyroscopic moment missing", "body", after_rates_patch(_one_gyroscope)),
     CampaignFault(
-        "dampers twice as strong", "suspension", attribute_patch("models.rail.equations:rates", _doubled_damping)
+        "dampers twice as strong", "suspension", attribute_patch("models.rail.equations:fill_rates", _doubled_damping)
     ),
 )
 

@@ -25,7 +25,7 @@ from models.fatigue.damage import pseudo_damage
 from models.ride.covariance import lyapunov_solution
 from models.ride.measures import dynamic_load_factor, time_share_beyond
 from models.ride.nonlinear_copies import copies_in_time
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.systems.hub_forces.measurement import HubForces, MeasuredAngles
 from models.systems.hub_forces.tilt_filter import StatedDeviations, estimate_tilt
 from models.systems.ride.of_scene import excitation_of, vehicle_of
@@ -56,7 +56,7 @@ def _monte_carlo_run(corner_wavenumber: float) -> Any:
     return copies_in_time(vehicle, road, 5.0, 1.0, copy_count=20, seed=1, longest_step=2e-3)
 
 
-def _vehicle_and_road(corner_wavenumber: float) -> tuple[SpatialVehicle, Excitation]:
+def _vehicle_and_road(corner_wavenumber: float) -> tuple[SpatialVehicle, RoadExcitation]:
     """Nonlinear quarter car, and a random road with a corner wavenumber (rad/m)."""
     scene = build(
         {

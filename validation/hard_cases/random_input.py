@@ -16,7 +16,7 @@ from models.engines.protocol import build
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
 from models.ride.road_path import RoadPath, road_path
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.road.two_track import road_excitation, road_of_level, wheels_on_track
 from models.sensors.inertial_unit import (
     angle_random_walk_of,
@@ -92,9 +92,9 @@ def stream_piece_error(engine_name: str, work_folder: Path) -> float:
     return float(np.abs(np.concatenate(parts[::-1]) - complete_stream).max())
 
 
-def _first_order_road() -> Excitation:
+def _first_order_road() -> RoadExcitation:
     """Road height as white noise through a first-order filter, under a single wheel."""
-    return Excitation(np.array([[-CORNER]]), np.array([[Q**0.5]]), (np.ones((1, 1)),), (0.0,))
+    return RoadExcitation(np.array([[-CORNER]]), np.array([[Q**0.5]]), (np.ones((1, 1)),), (0.0,))
 
 
 def road_variance_error(engine_name: str, work_folder: Path) -> float:

@@ -15,7 +15,7 @@ from models.core.scene_file import parse
 from models.ride.covariance import DIFFUSING, INFINITE, stationary_covariance
 from models.ride.excited import vehicle_with_road
 from models.ride.frequency import variances_by_quadrature
-from models.ride.marginal import Unstable
+from models.ride.marginal import UnstableVehicle
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import varying_speed
 from models.ride.weighting import WEIGHTINGS, system_with_weightings
@@ -147,7 +147,7 @@ def _error_unless_refused(vehicle: LinearVehicle) -> float:
     ):
         try:
             route()
-        except Unstable as error:
+        except UnstableVehicle as error:
             refusal = error
             if largest_relative_error(error.growth, growing) > 1e-9:
                 return np.inf

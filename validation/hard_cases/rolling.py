@@ -14,7 +14,7 @@ from models.core.errors import InputError, RunFailed
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
 from models.rail.eigenvalues import free_wheelset
-from models.rail.equations import Equations
+from models.rail.equations import WheelsetEquations
 from models.rail.equations import WheelsetPath as Motion
 from models.rail.wheelset import CHOSEN_WHEELSET, GRAVITY, Wheelset
 from models.systems.wheelset.of_scene import equations_class as kind_of
@@ -32,12 +32,12 @@ MIRROR_SIGNS = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
 
 def built_wheelset(
     engine_name: str, wheelset: Wheelset = CHOSEN_WHEELSET, speed: float = 40.0, **wheelset_options: Any
-) -> Equations:
+) -> WheelsetEquations:
     """Equations of motion of a wheelset in an implementation, with few contact cells."""
     return ENGINE_KINDS[engine_name](wheelset, speed, **({"cells": 7} | wheelset_options))
 
 
-def displaced_state(equations: Equations, **start_values: float) -> np.ndarray:
+def displaced_state(equations: WheelsetEquations, **start_values: float) -> np.ndarray:
     """Rest state with values added to entries named as in ``models.rail.equations``, such as Y."""
     state = equations.rest.copy()
     for name, value in start_values.items():
@@ -253,7 +253,7 @@ def too_large_step_naive_result(work_folder: Path) -> str:
     for step in (TIME_STEP, TIME_STEP / 8.0):
         states, contacts = np.empty((1, eq.STATE_COUNT)), equations.empty_contacts(1)
         state = displaced_state(equations, **LANDING)
-        equations.march(state, (step, round(0.1 / step), 1_000_000), states, contacts)
+        equations.march_wheelset(state, (step, round(0.1 / step), 1_000_000), states, contacts)
         ends.append(state)
     return f"displaced by {1e3 * abs(ends[1][eq.Y] - ends[0][eq.Y]):.2g} mm more or less after 0.1 s"
 

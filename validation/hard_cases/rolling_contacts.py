@@ -24,8 +24,8 @@ from models.engines.mujoco_quiet import installed
 from models.multibody.numbers import Handling, Tyres
 from models.multibody.plain.march import march
 from models.rail.energy import energy_ledger
-from models.rail.equations import Equations
-from models.rail.laid_profiles import Profiles
+from models.rail.equations import WheelsetEquations
+from models.rail.laid_profiles import CrossSections
 from models.rail.wheel_forces import REGULARISED_SPEED
 from models.rail.wheelset import CHOSEN_WHEELSET
 from models.systems.handling.energy import drive_energy
@@ -116,12 +116,12 @@ def too_long_step_error(engine_name: str, work_folder: Path) -> float:
 def patch_jump_energy_error(engine_name: str, work_folder: Path) -> float:
     """Case: a wheelset whose contacts open and close. Error: that of its energy balance divided by the energy that
     creep dissipates."""
-    equations = built_wheelset(engine_name, CHOSEN_WHEELSET.changed(profiles=Profiles()), 30.0)
+    equations = built_wheelset(engine_name, CHOSEN_WHEELSET.changed(profiles=CrossSections()), 30.0)
     motion = equations.run(displaced_state(equations, Y=3e-3, Y_RATE=0.2), 0.03, 1e-4)
     carries = motion.contacts["load"] > 0.0
     if (carries[1:] != carries[:-1]).any(axis=1).sum() < 2 or motion.contacts["power"].max() > 0.0:
         return np.inf
-    book = energy_ledger(Equations(equations.wheelset, equations.speed, equations.law, equations.cells), motion)
+    book = energy_ledger(WheelsetEquations(equations.wheelset, equations.speed, equations.law, equations.cells), motion)
     return float(np.abs(book.residual).max() / book.creep[-1])
 
 

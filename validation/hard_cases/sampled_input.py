@@ -15,7 +15,7 @@ from models.core.signals import SNAP_SHARE, Sampled
 from models.core.time_series import write_time_series
 from models.engines.protocol import build
 from models.engines.stability import first_order, linearised
-from models.road.continuation import run_in
+from models.road.continuation import road_with_run_in
 from models.road.polyline import PolylineProfile
 from models.road.profile import SplineProfile
 from models.road.signal import RoadUnderWheels
@@ -219,7 +219,7 @@ def _road_with_bump() -> RoadUnderWheels:
     """Road with a bump 50 mm high and 0.3 m long after 200 m of flat road, at 20 m/s."""
     station = 0.1 * np.arange(2300)
     height = -0.05 * np.exp(-(((station - 200.0) / 0.15) ** 2))
-    return RoadUnderWheels(run_in(SplineProfile.through(station, height, "bump")), 20.0, 2.0)
+    return RoadUnderWheels(road_with_run_in(SplineProfile.through(station, height, "bump")), 20.0, 2.0)
 
 
 def bump_error(engine_name: str, work_folder: Path) -> float:

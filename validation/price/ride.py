@@ -21,7 +21,7 @@ from models.ride.excited import vehicle_with_road
 from models.ride.frequency import spectral_densities, variances_by_quadrature
 from models.ride.monte_carlo import VarianceEstimate, variances_at_constant_speed
 from models.ride.sweep import variance_sweep
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
@@ -63,12 +63,12 @@ class PricedRide:
     numbers, and the true standard deviations (p,) in case 3 with their relative uncertainty."""
 
     vehicle: LinearVehicle
-    roads: dict[str, Excitation]
+    roads: dict[str, RoadExcitation]
     true_deviations: np.ndarray
     uncertainty: float
 
     @property
-    def road(self) -> Excitation:
+    def road(self) -> RoadExcitation:
         """The road in the paper's third case of correlation: two tracks, with a delay at the rear axle."""
         return self.roads["3"]
 

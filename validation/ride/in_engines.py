@@ -11,7 +11,7 @@ from models.ride.excited import vehicle_with_road
 from models.ride.frequency import one_sided_densities, standard_errors
 from models.ride.road_path import road_path
 from models.ride.statistical_linearisation import largest_error_seen, statistically_linear
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.road.two_track import TRACK_DENSITY_LEVEL
 from models.systems.ride.nonlinear import EngineRide, drive_over_road
 from models.vehicles.linear_vehicle import LinearVehicle
@@ -35,7 +35,7 @@ SAME_LAWS = "the same tableau, road and laws; the sums are taken in another orde
 @cache
 def vehicle_and_road(
     vehicle_name: str, level_factor: float = 1.0, gravity: float = GRAVITY
-) -> tuple[SpatialVehicle, Excitation]:
+) -> tuple[SpatialVehicle, RoadExcitation]:
     """A shipped vehicle, and a road with ``level_factor`` times the paper's level; a vehicle without a track width has
     one track.
     """
@@ -148,7 +148,7 @@ def linear_engine_rows() -> tuple[list[Row], dict[str, Any]]:
 
 
 def _spectral_densities(
-    runs_by_engine: dict[str, EngineRide], linear_vehicle: LinearVehicle, road_excitation: Excitation
+    runs_by_engine: dict[str, EngineRide], linear_vehicle: LinearVehicle, road_excitation: RoadExcitation
 ) -> dict[str, Any]:
     """One-sided spectral densities (1/Hz) of SHOWN_OUTPUTS: of the linear vehicle in closed form, and by Welch's method
     of each engine's run."""

@@ -8,7 +8,7 @@ from models.ride.closed_forms import QuarterCar
 from models.ride.covariance import FINITE, stationary_covariance
 from models.ride.excited import DelayedSystem, vehicle_with_road
 from models.ride.frequency import spectral_densities, variances_by_quadrature
-from models.ride.marginal import Unstable, split_marginal
+from models.ride.marginal import UnstableVehicle, split_marginal
 from models.ride.weighting import WEIGHTINGS, system_with_weightings
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
@@ -164,7 +164,7 @@ def _unstable_row() -> Row:
         stationary_covariance(
             vehicle_with_road(quarter_car_vehicle([(0.0, replace(QUARTER_CAR, c=-5.0))]), one_track((0.0,), 0.3), 20.0)
         )
-    except Unstable as error:
+    except UnstableVehicle as error:
         why = str(error)
         outcome = "refused" if "swings at 11.8" in why and "grows" in why else "refused without its mode"
     quantity = "a quarter car with a damper of -5 N s/m"

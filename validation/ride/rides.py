@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from models.ride.closed_forms import QuarterCar
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.road.two_track import (
     CORRELATION_CASES,
     TRACK_DENSITY_LEVEL,
@@ -82,13 +82,13 @@ def largest_relative_error(computed_values: ArrayLike, expected_values: ArrayLik
     return float(np.abs(np.asarray(computed_values) / np.asarray(expected_values) - 1.0).max())
 
 
-def one_track(axle_positions: tuple[float, ...], corner_wavenumber: float = 0.0) -> Excitation:
+def one_track(axle_positions: tuple[float, ...], corner_wavenumber: float = 0.0) -> RoadExcitation:
     """Road of a single track under axles at ``axle_positions`` (m); its height z over the distance obeys
     z' = -corner_wavenumber z + w with white noise w; corner_wavenumber in 1/m.
     """
     heights = tuple(np.eye(len(axle_positions))[:, [i]] for i in range(len(axle_positions)))
     filter_ = np.array([[-corner_wavenumber]]), np.array([[ROAD_INTENSITY**0.5]])
-    return Excitation(*filter_, heights, tuple(axle_positions[0] - x for x in axle_positions))
+    return RoadExcitation(*filter_, heights, tuple(axle_positions[0] - x for x in axle_positions))
 
 
 def paper_road(
@@ -96,7 +96,7 @@ def paper_road(
     *correlation_words: str,
     level_factor: float = TRACK_DENSITY_LEVEL,
     cutoff_wavenumber: float | None = None,
-) -> Excitation:
+) -> RoadExcitation:
     """The paper's road of two tracks under wheels, with the named kinds of correlation; one track for wheels without a
     track width."""
     y = half_track(wheel_positions)
@@ -108,7 +108,7 @@ def paper_road(
 
 def five_correlation_cases(
     wheel_positions: Sequence[WheelPosition], given_road: TwoTrackRoad | None = None
-) -> dict[str, Excitation]:
+) -> dict[str, RoadExcitation]:
     """The paper's road, or a given road, in the paper's five cases of correlation, by the number of the case."""
     given_road = given_road or road_of_level(half_track(wheel_positions))
     return {

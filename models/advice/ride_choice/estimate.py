@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.advice.ride_choice.candidates import SCREENED_SPEEDS
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.systems.ride.of_scene import scene_errors
 from models.systems.ride.omissions import effects_of
 from models.systems.ride.reduced_scene import ReducedScene
@@ -50,7 +50,7 @@ def estimate(ride_scene: RideScene) -> Estimate:
     return Estimate(effects, speeds, states, problems * _eigenvalue_problem())
 
 
-def _count_of_states(scene: ReducedScene, excitation: Excitation) -> int:
+def _count_of_states(scene: ReducedScene, excitation: RoadExcitation) -> int:
     """Number of states of the vehicle and of the road's filters."""
     return 2 * len(scene.vehicle.coordinates()) + len(excitation.heights) * len(excitation.F)
 

@@ -18,8 +18,8 @@ from models.core.strict import LARGEST_QUANTITY, Strict, quantity
 from models.ride.gaussian_laws import mean_force_and_slope, mean_friction_slope
 from models.ride.nonlinear_copies import STEPS_PER_READING, CopiesMarch, settling_time, usual_step
 from models.ride.road_path import RoadPath, check_rates, road_path
-from models.ride.statistical_linearisation import BentSpring, statistically_linear
-from models.road.excitation import Excitation
+from models.ride.statistical_linearisation import BentSpringResult, statistically_linear
+from models.road.excitation import RoadExcitation
 from models.systems.ride.of_scene import has_no_linear_equivalent
 from models.systems.ride.omissions import effects_of, wheels_of
 from models.systems.ride.reduced_scene import OmissibleEffect, ReducedScene, refusal_reason
@@ -57,7 +57,7 @@ class CopySteps:
     half: float
     settling_steps: int
     counted_steps: int
-    springs: dict[str, BentSpring]
+    springs: dict[str, BentSpringResult]
 
     @property
     def steps(self) -> int:
@@ -130,7 +130,7 @@ class CopiesInTime:
         return replace(self, samples=self.samples.model_copy(update={"copies": min(copies, self.samples.copies)}))
 
     @cached_property
-    def _excitation(self) -> Excitation:
+    def _excitation(self) -> RoadExcitation:
         return self.scene.excitation()
 
     def vehicle(self, copy_steps: CopySteps) -> SpatialVehicle:
@@ -206,7 +206,7 @@ def _can_be_left_out(scene: ReducedScene, effect: OmissibleEffect) -> bool:
     )
 
 
-def reduced_vehicle(scene: ReducedScene, motion_of_spring: dict[str, BentSpring]) -> SpatialVehicle:
+def reduced_vehicle(scene: ReducedScene, motion_of_spring: dict[str, BentSpringResult]) -> SpatialVehicle:
     """The vehicle of a reduced scene; ``motion_of_spring`` : motion of the nonlinear springs, for the gains of
     statistical linearisation.
     """
@@ -230,7 +230,7 @@ def reduced_vehicle(scene: ReducedScene, motion_of_spring: dict[str, BentSpring]
 
 
 def _linearised_spring(
-    spring: SpringDamper, nonlinear_laws: frozenset[str], motion_of_spring: dict[str, BentSpring]
+    spring: SpringDamper, nonlinear_laws: frozenset[str], motion_of_spring: dict[str, BentSpringResult]
 ) -> SpringDamper:
     """The spring with gains of statistical linearisation in place of the nonlinear ``nonlinear_laws``."""
     motion = motion_of_spring.get(spring.name)

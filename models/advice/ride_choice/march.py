@@ -21,7 +21,7 @@ import numpy as np
 from models.advice.ride_choice.reduced import Reduced, ReducedVehicle
 from models.advice.ride_choice.waves import Filters, frequency_panels, pair_factors, weighting_factors
 from models.core.runge_kutta import RK4_STAGES
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 
 LEAST_ALIASES, ALIAS_RANGE_FACTOR = 6, 6.0
 """Least number of aliased waves to either side, and the ratio of their range to the road's highest corner frequency;
@@ -260,7 +260,7 @@ class Cost:
         return self.calls * self.states
 
 
-def cost(vehicle: ReducedVehicle, excitation: Excitation) -> Cost:
+def cost(vehicle: ReducedVehicle, excitation: RoadExcitation) -> Cost:
     """Cost of a run of a stable vehicle on its road with the largest stable step; infinite for an unstable vehicle,
     which has none.
     """

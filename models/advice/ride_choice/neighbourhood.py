@@ -17,7 +17,7 @@ from models.advice.ride_choice.reduced import ReducedVehicle, Vehicles, speed_if
 from models.advice.ride_choice.response import Response
 from models.advice.ride_choice.slopes import Sensitivity, Shifts
 from models.advice.ride_choice.waves import at_axles, filter_states, frequency_panels, variances, weighting_factors
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.systems.ride.reduced_scene import ReducedScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
@@ -173,7 +173,11 @@ class FrequencySum:
     """Variances as sums over frequencies (w,) for a reduced scene at speeds (m/s)."""
 
     def __init__(
-        self, excitation: Excitation, vehicle: ReducedVehicle, quantities: Sequence[tuple[int, str]], speeds: np.ndarray
+        self,
+        excitation: RoadExcitation,
+        vehicle: ReducedVehicle,
+        quantities: Sequence[tuple[int, str]],
+        speeds: np.ndarray,
     ) -> None:
         self.excitation, self.speeds = excitation, speeds
         rates = vehicle.modes.rates if vehicle.modes else _vehicle_eigenvalues(vehicle.linear)

@@ -18,9 +18,9 @@ from models.advice.ride_choice.modes import Modes, modes_of, modes_with_road, mo
 from models.core.errors import InputError
 from models.core.scene_effects import tables_of
 from models.ride.covariance import noise_intensity_of_system
-from models.ride.excited import DelayedSystem, VehicleStates, first_order_system, vehicle_states
+from models.ride.excited import DelayedSystem, VehicleStateForm, first_order_system, vehicle_states
 from models.ride.weighting import system_with_weightings
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.systems.ride.reduced_scene import ReducedScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
@@ -36,7 +36,7 @@ class ReducedVehicle:
 
     linear: LinearVehicle
     N: np.ndarray
-    states: VehicleStates
+    states: VehicleStateForm
     residual_flexibility: np.ndarray
 
     @cached_property
@@ -58,7 +58,7 @@ class Reduced:
     """
 
     reduced_vehicle: ReducedVehicle
-    excitation: Excitation
+    excitation: RoadExcitation
     system: DelayedSystem
     T: np.ndarray
     left: np.ndarray
@@ -121,7 +121,7 @@ class Roads:
 
     def __init__(self) -> None:
         self._numbers = IndexNumbers()
-        self._stored: dict[int, Excitation] = {}
+        self._stored: dict[int, RoadExcitation] = {}
 
     def number(self, scene: ReducedScene) -> int:
         """Index number that is the same for scenes with the same road: the same road effects, and the same tables that
@@ -130,7 +130,7 @@ class Roads:
         ride = scene.ride_scene
         return self._numbers.index_of(ride, lambda: (ride.road, *tables_of(ride)))
 
-    def excitation_of(self, scene: ReducedScene) -> Excitation:
+    def excitation_of(self, scene: ReducedScene) -> RoadExcitation:
         """The road excitation of a reduced scene, computed when it is first requested."""
         number = self.number(scene)
         if number not in self._stored:
@@ -218,7 +218,7 @@ class FullScene:
         self.linear = self.vehicles.linear(scene.vehicle, speed)
         self.excitation = self.vehicles.roads.excitation_of(scene)
         self._stored: dict[Hashable, Reduced] = {}
-        self._roads: dict[Hashable, tuple[Excitation, np.ndarray, np.ndarray]] = {}
+        self._roads: dict[Hashable, tuple[RoadExcitation, np.ndarray, np.ndarray]] = {}
         self.full = self.reduced(scene)
 
     def reduced(self, reduced_scene: ReducedScene) -> Reduced:
@@ -261,11 +261,11 @@ class FullScene:
         left[2 * inert : road, :n], left[road:, 2 * n :] = states.integrated_part @ vehicle.residual_flexibility, left_f
         return Reduced(vehicle, excitation, system, np.vstack([q, q @ system.A, f]), left, x)
 
-    def road(self, reduced_scene: ReducedScene) -> Excitation:
+    def road(self, reduced_scene: ReducedScene) -> RoadExcitation:
         """The road excitation of the reduced scene."""
         return self._heights(reduced_scene)[0]
 
-    def _heights(self, reduced_scene: ReducedScene) -> tuple[Excitation, np.ndarray, np.ndarray]:
+    def _heights(self, reduced_scene: ReducedScene) -> tuple[RoadExcitation, np.ndarray, np.ndarray]:
         """The road excitation of the reduced scene, and the matrices of ``_filter_state_maps`` for it."""
         key = self.vehicles.roads.number(reduced_scene)
         if key not in self._roads:
@@ -275,7 +275,7 @@ class FullScene:
 
 
 def _filter_state_maps(
-    scene: ReducedScene, full_road: Excitation, reduced_scene: ReducedScene, reduced_road: Excitation
+    scene: ReducedScene, full_road: RoadExcitation, reduced_scene: ReducedScene, reduced_road: RoadExcitation
 ) -> tuple[np.ndarray, np.ndarray]:
     """Matrices from the filter states of the reduced road to those of the full road, axle by axle, and back; states
     that effects add are last.

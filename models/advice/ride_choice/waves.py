@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from models.ride.weighting import WEIGHTINGS
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 
 GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 PER_DECADE = 8
@@ -43,7 +43,7 @@ def frequency_panels(
     return omega, (half[:, None] * GAUSS_WEIGHTS).ravel(), omega > late[-1]
 
 
-def filter_states(excitation: Excitation, speeds: np.ndarray, omega: np.ndarray) -> np.ndarray:
+def filter_states(excitation: RoadExcitation, speeds: np.ndarray, omega: np.ndarray) -> np.ndarray:
     """States (v, w, m, k) of an axle's road filter under unit noise, without delay, at speeds (v,) in m/s and angular
     frequencies (w,) in rad/s.
     """
@@ -55,7 +55,7 @@ def filter_states(excitation: Excitation, speeds: np.ndarray, omega: np.ndarray)
 
 def at_axles(
     states_of_axle: np.ndarray,
-    excitation: Excitation,
+    excitation: RoadExcitation,
     speeds: np.ndarray,
     omega: np.ndarray,
     is_independent: np.ndarray,
@@ -103,7 +103,7 @@ class Filters:
     noises : for each corner, the states (m, k) that unit noises excite through its mode.
     """
 
-    def __init__(self, excitation: Excitation) -> None:
+    def __init__(self, excitation: RoadExcitation) -> None:
         corners, V = np.linalg.eig(excitation.F)
         driven = np.linalg.solve(V, excitation.G + 0j)
         noise = driven @ driven.conj().T
@@ -144,7 +144,7 @@ def _noise_product(first_factor: np.ndarray, second_factor: np.ndarray) -> np.nd
 
 def variances(
     gains: Sequence[np.ndarray],
-    excitation: Excitation,
+    excitation: RoadExcitation,
     speeds: np.ndarray,
     omega: np.ndarray,
     is_independent: np.ndarray,

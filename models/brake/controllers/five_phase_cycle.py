@@ -35,7 +35,7 @@ class CycleWheelState(NamedTuple):
     """
 
     pressure: float
-    brake_torque: float
+    torque: float
     turning: float
     time: float
     impulse: float

@@ -158,22 +158,23 @@ class PerWheelLoop:
 class SpeedEstimate:
     """Estimate of the vehicle's speed (m/s) from sampled wheel speeds.
 
-    sample : s between two of them; first : slope (m/s^2) until one is learnt, chosen: with 10 a slip bang-bang takes
-    10 % more way on ice, as the estimate goes down with its wheels, with 4 it takes 8 % more on dry road, as it lets
-    them go too early, with 6 neither; steepest_deceleration : deceleration (m/s^2) that no vehicle exceeds;
+    sampling_period : s between two of them; first_slope : slope (m/s^2) until one is learnt, chosen: with 10 a slip
+    bang-bang takes 10 % more way on ice, as the estimate goes down with its wheels, with 4 it takes 8 % more on dry
+    road, as it lets them go too early, with 6 neither; steepest_deceleration : deceleration (m/s^2) that no vehicle
+    exceeds;
     slope_margin : the slope by the deceleration learnt; least_interval : s at least between the moments from which it
     is learnt. Wheels that are held at a slip and never come back teach it nothing.
     """
 
-    sample: float
-    first: float = 6.0
+    sampling_period: float
+    first_slope: float = 6.0
     steepest_deceleration: float = 10.0
     gentlest_deceleration: float = 1.0
     slope_margin: float = 1.2
     least_interval: float = 0.15
 
     def __post_init__(self) -> None:
-        self._speed, self._slope = math.nan, self.first
+        self._speed, self._slope = math.nan, self.first_slope
         self._fastest, self._rising, self._since = 0.0, False, 0.0
         self._peak = math.nan
 
@@ -183,12 +184,12 @@ class SpeedEstimate:
         if self._speed != self._speed:
             self._speed = self._peak = fastest
         self._learn_slope(fastest)
-        self._speed = max(fastest, self._speed - self._slope * self.sample)
+        self._speed = max(fastest, self._speed - self._slope * self.sampling_period)
         return self._speed
 
     def _learn_slope(self, fastest_wheel_speed: float) -> None:
         """Update the slope (m/s^2) of the vehicle's speed from the last two maxima of the fastest wheel's speed."""
-        self._since += self.sample
+        self._since += self.sampling_period
         if self._rising and fastest_wheel_speed < self._fastest and self._since >= self.least_interval:
             slope = self.slope_margin * (self._peak - self._fastest) / self._since
             self._slope = min(max(slope, self.gentlest_deceleration), self.steepest_deceleration)

@@ -23,7 +23,7 @@ def advance_slip_tangents(
     """Tangents of the lagging slip angles (W,) after a time (s), without and with the damper's part.
 
     slip_tangents (W,) : before, NaN where it is to begin as in steady motion; wheel_speeds (2, W) : along and across
-    (m/s); length
+    (m/s); relaxation_length
     (W,) : m; cornering_coefficient : largest cornering coefficient (1/rad).
     """
     (u, v), stiffness = wheel_speeds, np.sqrt(max(cornering_coefficient, SLOWEST_SPEED) * GRAVITY * relaxation_length)

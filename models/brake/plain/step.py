@@ -33,7 +33,7 @@ class StepSetting:
     ``least_speed`` (m/s) that replaces lower speeds in slip angles.
     """
 
-    on: VehicleOnRoad
+    vehicle_on_road: VehicleOnRoad
     steer: np.ndarray
     least_speed: float
 
@@ -96,7 +96,7 @@ class PlainVehicleSteps:
         """Accelerations (n,) at a state (2, n) whose wheels roll freely, and the wheels' rotational speeds (W,) in
         rad/s.
         """
-        plane, contacts = self.course.on.plane, self._contacts(vehicle_state[0], vehicle_state[1])
+        plane, contacts = self.course.vehicle_on_road.plane, self._contacts(vehicle_state[0], vehicle_state[1])
         starts = speeds_along_wheels(contacts)
         no_torques, report = np.zeros((2, starts.size)), np.zeros((starts.size, SPINS + 1))
         moving = MovingVehicle(
@@ -108,7 +108,7 @@ class PlainVehicleSteps:
 
     def _end_status(self, moving_vehicle: MovingVehicle) -> int:
         """Status at the end of a step: the vehicle leans too far, a train folds, or neither."""
-        q, fold = moving_vehicle.state[0], self.course.on.plane.jackknife_angle
+        q, fold = moving_vehicle.state[0], self.course.vehicle_on_road.plane.jackknife_angle
         if not np.abs(q[self.vehicle.leans]).max() <= UPRIGHT:
             return OVER
         return FINE if (np.abs(q[self.vehicle.turns]) <= fold).all() else FOLDED
@@ -123,14 +123,14 @@ class PlainVehicleSteps:
 
     def _surfaces_under(self, vehicle_state: np.ndarray, duration: float) -> list[WheelSurface]:
         """Surfaces under the wheels over a time (s), in which the wheels move on straight lines."""
-        plane, (position, rates) = self.course.on.plane, map(self._of_units, vehicle_state)
+        plane, (position, rates) = self.course.vehicle_on_road.plane, map(self._of_units, vehicle_state)
         paths = np.empty((plane.wheels, 2, 2))
         for k in range(plane.masses.size):
             is_of_unit = plane.unit == k
             paths[is_of_unit] = ground_paths(
-                *unit_position_in_train(position, rates, plane.reach[k], k), plane.place[is_of_unit], duration
+                *unit_position_in_train(position, rates, plane.arm_lengths[k], k), plane.place[is_of_unit], duration
             )
-        return surfaces_under_wheels(self.course.on.road, paths, self.course.on.kind)
+        return surfaces_under_wheels(self.course.vehicle_on_road.road, paths, self.course.vehicle_on_road.kind)
 
     def _contacts(self, q: np.ndarray, v: np.ndarray) -> list[TyreContact]:
         """Contacts of all tyres at coordinates and rates (n,)."""
@@ -161,19 +161,32 @@ class PlainVehicleSteps:
                 motion = replace(
                     motion, across=moving_vehicle.lag.across(i, max(motion.forward_speed, course.least_speed))
                 )
-            radius, inertia = float(course.on.plane.radius[i]), float(course.on.plane.spin[i])
+            radius, inertia = (
+                float(course.vehicle_on_road.plane.radius[i]),
+                float(course.vehicle_on_road.plane.spin_inertia[i]),
+            )
             braked = BrakedStep(
                 (brake_torques[0, i], brake_torques[1, i]), duration, radius, inertia, moving_vehicle.turning[i]
             )
-            moving_vehicle.report[i] = tyre_report(course.on.tables, wheel_surfaces[i], motion, contact.load, braked)
-        spun = course.on.plane.spin * (moving_vehicle.report[:, SPINS] - moving_vehicle.turning) / duration
+            moving_vehicle.report[i] = tyre_report(
+                course.vehicle_on_road.tables, wheel_surfaces[i], motion, contact.load, braked
+            )
+        spun = (
+            course.vehicle_on_road.plane.spin_inertia
+            * (moving_vehicle.report[:, SPINS] - moving_vehicle.turning)
+            / duration
+        )
         return ConstantWheelForces(course.steer, moving_vehicle.report[:, :2].copy(), spun)
 
     def time_of_rest(self, moving_vehicle: MovingVehicle) -> float | None:
         """Time (s) within the step at which the kinetic energy of the plane motion is least, if the vehicle is about to
         stop; else None.
         """
-        plane, v, a = self.course.on.plane, self._of_units(moving_vehicle.state[1]), moving_vehicle.accelerations
+        plane, v, a = (
+            self.course.vehicle_on_road.plane,
+            self._of_units(moving_vehicle.state[1]),
+            moving_vehicle.accelerations,
+        )
         weights = np.array([plane.masses.sum(), plane.masses.sum(), *plane.inertias])
         speed, falling, rate = (float(weights @ product) for product in (v * v, -v * a, a * a))
         if speed == 0.0 and not moving_vehicle.turning.any():

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.brake.plain.wheel import TyreForceCurve, WheelStepData, wheel_step
-from models.tyre.tyre_table import Tables
+from models.tyre.tyre_table import StackedTyreTables
 
 LOCKING_SLIP = 0.98
 """Slip above which the force turns to that of a locked tyre, against the direction of sliding."""
@@ -42,7 +42,7 @@ class WheelSurface:
 class TyreFriction:
     """Friction of a tyre at one slip angle (rad, from 0) and load (N) on a surface."""
 
-    tables: Tables
+    tables: StackedTyreTables
     surface: WheelSurface
     angle: float
     load: float
@@ -117,7 +117,11 @@ class BrakedStep:
 
 
 def tyre_report(
-    tyre_tables: Tables, surface: WheelSurface, wheel_motion: WheelMotion, load: float, braked_step: BrakedStep
+    tyre_tables: StackedTyreTables,
+    surface: WheelSurface,
+    wheel_motion: WheelMotion,
+    load: float,
+    braked_step: BrakedStep,
 ) -> np.ndarray:
     """Report of a tyre over a step (7,), in the columns of ``plane_step``: mean forces along and across (N), load (N),
     mean slip, slip angle (rad), time locked (s), rotational speed (rad/s) at the end.

@@ -5,7 +5,7 @@ import numpy as np
 from models.brake.controller import Command, Sample
 
 
-class ExampleController:
+class Example:
     """Controller that releases above 15 % slip, applies below 8 %, and keeps its last command between them; needs the
     vehicle's speed.
     """

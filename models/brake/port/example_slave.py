@@ -4,7 +4,7 @@ import numpy as np
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 from models.brake.controller import Sample
-from models.brake.port.example import ExampleController
+from models.brake.port.example import Example
 
 
 class ExampleSlave(Fmi2Slave):
@@ -21,7 +21,7 @@ class ExampleSlave(Fmi2Slave):
         for name in ("supply", "speed"):
             self.register_variable(Real(name, causality=Fmi2Causality.input))
         self.register_variable(Boolean("brake", causality=Fmi2Causality.input, variability=Fmi2Variability.discrete))
-        self._number, self._controller = 0, ExampleController(4)
+        self._number, self._controller = 0, Example(4)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Set the outputs to the controller's command for the present inputs."""

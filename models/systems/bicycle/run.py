@@ -7,7 +7,7 @@ import time
 import numpy as np
 from scipy.integrate import cumulative_simpson
 
-from models.bicycle.four_bodies import FALLEN_LEAN, LEAN, STEER, YAW, Ride, Y, straight_rolling
+from models.bicycle.four_bodies import FALLEN_LEAN, LEAN, STEER, YAW, BicycleRide, Y, straight_rolling
 from models.bicycle.ideal_rolling import IdealBicycle
 from models.bicycle.rolling_tyres import RollingBicycle
 from models.core.assumptions import Assumption, with_assumptions
@@ -43,7 +43,8 @@ LEAN_AT_GROUND_CONTACT = 1.0
 
 
 def run(scene: BicycleScene, engine: str, *, error: bool = False) -> Result:
-    """Run a bicycle scene in "exudyn", "mujoco" or "reference"; the result's detail is the ``Ride``. Raises RunFailed.
+    """Run a bicycle scene in "exudyn", "mujoco" or "reference"; the result's detail is the ``BicycleRide``. Raises
+    RunFailed.
 
     error : whether the error of the time steps is estimated, by further runs in longer steps.
     """
@@ -91,7 +92,7 @@ def bicycle_assumptions(scene: BicycleScene) -> list[Assumption]:
 
 def run_on_tyres(
     scene: BicycleScene, engine: str, time_step: float, duration: float | None = None, steps_per_row: int | None = None
-) -> Ride:
+) -> BicycleRide:
     """Run the bicycle on its tyres in an engine with a step (s). The work is summed over all steps. Recorded rows are
     ``steps_per_row`` steps apart, by default at most LARGEST_ROW_SPACING (s); the last row is the end of the run.
     """
@@ -109,7 +110,7 @@ def run_on_tyres(
     kept_rows = slice(None, None, steps_per_row or _steps_between_rows(step_count, time_step))
     plain, q, v = IdealBicycle(rolling.bicycle), path.positions[kept_rows], path.rates[kept_rows]
     motion = [plain.energy(*row) for row in zip(q, v, strict=True)]
-    ride = Ride(
+    ride = BicycleRide(
         path.times[kept_rows],
         q,
         v,
@@ -136,7 +137,7 @@ def _steps_between_rows(step_count: int, time_step: float) -> int:
     return next(stride for stride in range(most_steps, 0, -1) if step_count % stride == 0)
 
 
-def run_with_ideal_rolling(scene: BicycleScene) -> Ride:
+def run_with_ideal_rolling(scene: BicycleScene) -> BicycleRide:
     """Run the bicycle with wheels that roll without slip; recorded rows are about LARGEST_ROW_SPACING (s) apart."""
     rolling, run = scene.bicycle_on_tyres(), scene.run
     bicycle = IdealBicycle(rolling.bicycle, rolling.control)
@@ -151,7 +152,7 @@ def _with_step_error(run_result: Result, scene: BicycleScene) -> Result:
         ride.steps, scene.run.step
     )  # in steps of any length: rows of longer ones are among these rows
 
-    def series(ride: Ride) -> Series:
+    def series(ride: BicycleRide) -> Series:
         columns = {name: ride.positions[:, list(UNIT_OF_COORDINATE).index(name)] for name in CHANNELS_WITH_ERROR}
         return Series(ride.times, {name: values for name, values in columns.items() if np.abs(values).max() > 1e-12})
 

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from models.bicycle.rolling_tyres import UNCHANGED_TYRE, BicycleTyre, RollingBicycle
-from models.bicycle.whipple import HIGHEST_SPEED, Control, Whipple, load_bicycle
+from models.bicycle.whipple import HIGHEST_SPEED, SteeringControl, Whipple, load_bicycle
 from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects, with_effect_tables
 from models.core.scene_file import SceneFile, checked
@@ -51,7 +51,7 @@ class BicycleScene(SceneFile):
     study: str = Field(default="bicycle", description="the study that runs the scene")
     bicycle: BicycleTable = BicycleTable()
     tyres: BicycleTyre = UNCHANGED_TYRE
-    control: Control = Control()
+    control: SteeringControl = SteeringControl()
     speeds: EigenvalueSpeedsTable = EigenvalueSpeedsTable()
     run: BicycleRunTable = BicycleRunTable()
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")

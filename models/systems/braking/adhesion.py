@@ -89,7 +89,7 @@ def axle_geometry(scene: BrakingScene) -> AxleLoads:
 
 def trailer_loads(vehicle: BrakedVehicle, braking_rate_z: float) -> np.ndarray:
     """Loads (2,) in N of the trailer's axles at a deceleration z g; shape (0,) without a trailer."""
-    loads = vehicle.plane.static - vehicle.plane.by_x * braking_rate_z * GRAVITY
+    loads = vehicle.plane.static_loads - vehicle.plane.load_per_x_acceleration * braking_rate_z * GRAVITY
     return loads[4:].reshape(-1, 2).sum(axis=1)
 
 
@@ -115,7 +115,10 @@ def measured_adhesion(scene: BrakingScene, surface_name: str) -> Adhesion:
     if scene.trailer is None:
         return Adhesion(front, rear)
     train = vehicle_on_one_surface(scene, surface_name)
-    rates, weight = [_single_axle_braking_rate(scene, train, axle) for axle in (2, 3)], float(train.plane.static.sum())
+    rates, weight = (
+        [_single_axle_braking_rate(scene, train, axle) for axle in (2, 3)],
+        float(train.plane.static_loads.sum()),
+    )
     trailer = (adhesion_trailer(z, weight, float(trailer_loads(train, z)[i])) for i, z in enumerate(rates))
     return Adhesion(front, rear, tuple(trailer))
 

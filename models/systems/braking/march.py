@@ -28,7 +28,7 @@ from models.brake.samples import (
 )
 from models.brake.surfaces import UNIFORM_ROAD, RoadSurfaces, VehicleOnRoad, check_step_distance
 from models.core.errors import RunFailed
-from models.tyre.tyre_table import Tables, TyreTable, stacked_tables
+from models.tyre.tyre_table import StackedTyreTables, TyreTable, stacked_tables
 
 LARGEST_SAMPLE_BATCH = 1024
 """Most samples that are computed at a time where the controller's command is constant."""
@@ -77,7 +77,7 @@ class BrakedVehicle:
 
     plane: PlaneVehicle
     kind: np.ndarray
-    tables: Tables
+    tables: StackedTyreTables
     slope: float
     road: RoadSurfaces
     brakes: WheelBrakes
@@ -127,8 +127,8 @@ class BrakedVehicle:
         steady = self.steering is None and is_steady(controller)
         samples_at_once = int(min(longest_duration / self.sample + 2.0, LARGEST_SAMPLE_BATCH)) if steady else 1
         record = SampleRecord(
-            current_row.whole,
-            np.empty((samples_at_once, current_row.whole.size)),
+            current_row.all_values,
+            np.empty((samples_at_once, current_row.all_values.size)),
             np.zeros(1, dtype=np.int64),
             longest_duration - 1e-9,
         )
@@ -137,13 +137,13 @@ class BrakedVehicle:
             LARGEST_PRESSURE if isinstance(controller, SensedController) else 0.0
         )  # noise of a sensor may exceed the supply
         motion = current_row.motion(np.zeros(2 + self.plane.masses.size))
-        rows, status = [current_row.whole[None].copy()], FINE
+        rows, status = [current_row.all_values[None].copy()], FINE
         try:
             for number, (status, time, speed, supply) in enumerate(self._moving(commands, record, current_row, motion)):
                 if status in FATAL_END_STATUSES:
                     raise RunFailed("braking", ending_sentence(status, self.plane, motion), time)
                 _move_rows(rows, record)
-                if status == AT_REST or time >= record.until:
+                if status == AT_REST or time >= record.end_time:
                     break
                 braked = time >= self.switch_time - 1e-9
                 commands.samples[0] = samples_at_once if braked else 1
@@ -224,8 +224,8 @@ def _write_command(commands: BrakeCommands, command: Command, brake_switch_close
 
 def _move_rows(recorded_rows: list[np.ndarray], sample_record: SampleRecord) -> None:
     """Append a copy of the recorded rows to ``recorded_rows``, and empty the record."""
-    recorded_rows.append(sample_record.rows[: sample_record.left[0]].copy())
-    sample_record.left[0] = 0
+    recorded_rows.append(sample_record.rows[: sample_record.uncollected_count[0]].copy())
+    sample_record.uncollected_count[0] = 0
 
 
 def _braking_path(

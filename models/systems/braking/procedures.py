@@ -226,7 +226,7 @@ def steady_turn(vehicle: BrakedVehicle, speed: float, turn_radius: float) -> Ste
     suspension.
     """
     plane, units = vehicle.plane, vehicle.plane.masses.size
-    rearmost_x = np.array([plane.reach[k].sum() + plane.place[plane.unit == k, 0].min() for k in range(units)])
+    rearmost_x = np.array([plane.arm_lengths[k].sum() + plane.place[plane.unit == k, 0].min() for k in range(units)])
     unknown = np.zeros(1 + units)  # of wheels that roll along the circle: the last ones of each unit on its tangent
     unknown[0], unknown[1] = np.ptp(plane.place[plane.unit == 0, 0]) / turn_radius, -rearmost_x[0] / turn_radius
     unknown[2:] = (rearmost_x[1:] - rearmost_x[0]) / turn_radius
@@ -253,7 +253,7 @@ def _rolling_speeds(
     headings, rates, unit = motion_state[0, 2:], motion_state[1, 2:], plane_vehicle.unit
     forward = np.column_stack((np.cos(headings), np.sin(headings)))
     leftward = np.column_stack((-forward[:, 1], forward[:, 0]))
-    centres = motion_state[1, :2] + plane_vehicle.reach @ (rates[:, None] * leftward)
+    centres = motion_state[1, :2] + plane_vehicle.arm_lengths @ (rates[:, None] * leftward)
     spun = rates[unit, None] * (
         plane_vehicle.place[:, :1] * leftward[unit] - plane_vehicle.place[:, 1:] * forward[unit]
     )

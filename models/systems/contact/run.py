@@ -103,7 +103,7 @@ class ContactResults:
 
     contact: RollingContact
     motions: list[CreepagesAndSpin]
-    rolled_with_errors: Sequence[RollingResult]
+    rolled: Sequence[RollingResult]
     errors: Sequence[ContactErrors]
     pressing_seconds: float
     rolling_seconds: np.ndarray

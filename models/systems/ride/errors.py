@@ -15,9 +15,9 @@ from models.core.errors import InputError
 from models.core.result import Result
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
-from models.ride.sweep import Sweep
+from models.ride.sweep import VarianceSweep
 from models.ride.weighting import system_with_weightings
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.systems.ride.of_scene import LinearVehicleAtSpeed
 from models.vehicles.linear_vehicle import LinearVehicle
 
@@ -66,9 +66,9 @@ def _symmetrised(matrix: np.ndarray) -> np.ndarray:
 
 def with_error_of_sweep(
     run_result: Result,
-    sweep_by_speed: Sweep,
+    sweep_by_speed: VarianceSweep,
     vehicle_at_speed: LinearVehicleAtSpeed,
-    road_by_case: Mapping[str, Excitation],
+    road_by_case: Mapping[str, RoadExcitation],
     weighting_by_output: Mapping[str, str],
     matrix_accuracy: float,
 ) -> Result:
@@ -112,7 +112,7 @@ def with_error_of_sweep(
 
 def _deviations_of_changed(
     vehicle_at_speed: LinearVehicleAtSpeed,
-    road: Excitation,
+    road: RoadExcitation,
     weighting_by_output: Mapping[str, str],
     speed: float,
     matrix_accuracy: float,

@@ -19,11 +19,11 @@ from models.core.discretisation import (
 )
 from models.core.errors import RunFailed
 from models.core.result import Result
-from models.ride.nonlinear_copies import Copies, coarser_variances
+from models.ride.nonlinear_copies import CopyStatistics, coarser_variances
 from models.ride.speed_profile import SpeedProfile
 from models.ride.statistical_linearisation import StatisticallyLinear
-from models.ride.varying_speed import LARGEST_RATE_TIMES_STEP, VaryingSpeed, varying_speed
-from models.road.excitation import Excitation
+from models.ride.varying_speed import LARGEST_RATE_TIMES_STEP, VaryingSpeedDeviations, varying_speed
+from models.road.excitation import RoadExcitation
 from models.systems.ride.scene import RideScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
@@ -49,7 +49,7 @@ def with_error_of_drive(
     run_result: Result,
     scene: RideScene,
     vehicle_at_speed: LinearVehicle,
-    road: Excitation,
+    road: RoadExcitation,
     quasi_stationary_of: DeviationsAtConstantSpeed,
 ) -> Result:
     """Returns the result of a drive with the errors of its standard deviations. They are estimated by the same drive in
@@ -60,7 +60,7 @@ def with_error_of_drive(
     is 0 along a drive of constant speed. A drive of one step has no estimate.
     """
     assert scene.drive is not None
-    drive: VaryingSpeed = run_result.detail
+    drive: VaryingSpeedDeviations = run_result.detail
     if len(drive.time) < 3:
         return not_estimated(run_result, "the drive is one step long, and no longer step could be beside it")
     profile, step = scene.drive.profile(scene.file), float(np.diff(drive.time).max())
@@ -118,9 +118,9 @@ def _drive_until(speed_profile: SpeedProfile, end_time: float) -> SpeedProfile:
 def with_error_of_copies(
     run_result: Result,
     vehicle: SpatialVehicle,
-    road: Excitation,
+    road: RoadExcitation,
     linearised_by_speed: Mapping[float, StatisticallyLinear],
-    copies_by_speed: Mapping[float, Copies],
+    copies_by_speed: Mapping[float, CopyStatistics],
     road_seed: int,
 ) -> Result:
     """Returns the result with the errors of its standard deviations by copies and by statistical linearisation, for
@@ -163,7 +163,7 @@ def _rms_over_speeds(deviation_rows: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _step_errors(
-    vehicle: SpatialVehicle, road: Excitation, speed: float, fine_copies: Copies, road_seed: int
+    vehicle: SpatialVehicle, road: RoadExcitation, speed: float, fine_copies: CopyStatistics, road_seed: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Errors that the time steps cause in the copies' standard deviations at a speed (m/s), and observed orders of
     convergence, each (outputs,).
@@ -181,7 +181,7 @@ def _step_errors(
 
 def _linearisation_errors(
     linearised_by_speed: Mapping[float, StatisticallyLinear],
-    copies_by_speed: Mapping[float, Copies],
+    copies_by_speed: Mapping[float, CopyStatistics],
     unit_by_output: Mapping[str, str],
 ) -> dict[str, Estimate]:
     """Errors of the standard deviations by statistical linearisation, from their difference to the copies' standard

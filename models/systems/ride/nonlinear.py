@@ -25,10 +25,10 @@ from models.ensemble.store import ArraysByName
 from models.ensemble.workers import Crew
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
-from models.ride.nonlinear_copies import Copies, copies_in_time, longest_resolving_step
+from models.ride.nonlinear_copies import CopyStatistics, copies_in_time, longest_resolving_step
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import StatisticallyLinear, statistically_linear
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.systems.ride.assumptions import assumptions
 from models.systems.ride.errors_in_time import with_error_of_copies
 from models.systems.ride.of_scene import excitation_of, linear_vehicle
@@ -72,7 +72,7 @@ class NonlinearRide:
     speeds: np.ndarray
     small_motion: np.ndarray
     linearised_vehicles: list[StatisticallyLinear]
-    copies: dict[float, Copies]
+    copies: dict[float, CopyStatistics]
     shown: StatisticallyLinear
     tyres_may_lift: bool = False
 
@@ -155,19 +155,19 @@ class CopiesJob:
     """
 
     vehicle: SpatialVehicle
-    road: Excitation
+    road: RoadExcitation
     speeds: tuple[float, ...]
     sampling: RunSampling
 
     def __call__(self, paths: range) -> ArraysByName:
-        """Returns the fields of ``Copies`` as arrays, with the speed as their first axis."""
+        """Returns the fields of ``CopyStatistics`` as arrays, with the speed as their first axis."""
         copies_of_speeds = [self._copies_at_speed(self.speeds[i]) for i in paths]
         return {
             name: np.array([getattr(copies_at_speed, name) for copies_at_speed in copies_of_speeds])
-            for name in Copies.__dataclass_fields__
+            for name in CopyStatistics.__dataclass_fields__
         }
 
-    def _copies_at_speed(self, speed: float) -> Copies:
+    def _copies_at_speed(self, speed: float) -> CopyStatistics:
         s = self.sampling
         return copies_in_time(self.vehicle, self.road, speed, s.lasting, copy_count=s.copies, seed=s.seed)
 
@@ -176,7 +176,9 @@ class CopiesJob:
         return {}
 
 
-def _copies_by_speed(scene: RideScene, copies_job: CopiesJob, report_study_progress: Progress) -> dict[float, Copies]:
+def _copies_by_speed(
+    scene: RideScene, copies_job: CopiesJob, report_study_progress: Progress
+) -> dict[float, CopyStatistics]:
     """Compute Monte Carlo copies by the scene's worker processes; returns them by speed (m/s)."""
 
     def report_progress(finished_blocks: Done) -> None:
@@ -188,16 +190,16 @@ def _copies_by_speed(scene: RideScene, copies_job: CopiesJob, report_study_progr
     with Crew.of(scene, default_workers=1).at_work(len(copies_job.speeds)) as pool:
         arrays = run_paths(copies_job, len(copies_job.speeds), None, pool, PathBlocks(1), report_progress)
     return {
-        speed: Copies(tuple(names.tolist()), moments, float(step), float(duration), int(settling))
+        speed: CopyStatistics(tuple(names.tolist()), moments, float(step), float(duration), int(settling))
         for speed, names, moments, step, duration, settling in zip(
-            copies_job.speeds, *(arrays[name] for name in Copies.__dataclass_fields__), strict=True
+            copies_job.speeds, *(arrays[name] for name in CopyStatistics.__dataclass_fields__), strict=True
         )
     }
 
 
 def _equivalent_at_speed(
     vehicle: SpatialVehicle,
-    road: Excitation,
+    road: RoadExcitation,
     speed: float,
     speeds: np.ndarray,
     linearised_vehicles: list[StatisticallyLinear],
@@ -210,7 +212,7 @@ def _equivalent_at_speed(
 
 
 def _motion_of_equivalents(
-    vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, linearised_vehicles: list[StatisticallyLinear]
+    vehicle: SpatialVehicle, road: RoadExcitation, speeds: np.ndarray, linearised_vehicles: list[StatisticallyLinear]
 ) -> SpectralMotion:
     """Returns the Gaussian motion of the parts of statistically linearised vehicles; springs move about their mean
     travels.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects
 from models.own_model.scene_vehicle import scene_vehicle
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.road.iso8608 import level_of_class
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import TwoTrackRoad, half_track, road_excitation, road_of_level, wheels_on_track
@@ -41,7 +41,7 @@ class Built:
     """
 
     vehicle: SpatialVehicle
-    road: tuple[Callable[[Excitation], Excitation], ...] = ()
+    road: tuple[Callable[[RoadExcitation], RoadExcitation], ...] = ()
 
 
 def vehicle_of(scene: RideScene) -> SpatialVehicle:
@@ -156,7 +156,7 @@ def half_track_of(scene: RideScene, wheel_positions: tuple[WheelPosition, ...]) 
 
 def excitation_of(
     scene: RideScene, wheel_positions: tuple[WheelPosition, ...], correlation_case: tuple[str, str] | None = None
-) -> Excitation:
+) -> RoadExcitation:
     """Returns the road's excitation of the wheels with the scene's effects; ``correlation_case`` : correlations left to
     right and front to rear, by default the scene's.
     """

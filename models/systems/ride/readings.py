@@ -5,8 +5,8 @@ from functools import partial
 
 import numpy as np
 
-from models.ride.sweep import Sweep
-from models.ride.varying_speed import VaryingSpeed
+from models.ride.sweep import VarianceSweep
+from models.ride.varying_speed import VaryingSpeedDeviations
 from models.systems.ride.of_scene import GRAVITY, half_track_of, linear_vehicle, placed_wheels, road_of
 from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import SpatialVehicle, TyreOutput
@@ -58,7 +58,7 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
     return {name: float(np.sqrt(isotropic / plain) - 1.0) for name, plain, isotropic in pairs if plain > 0}
 
 
-def largest_deviation_difference(sweep: Sweep, reference_sweep: Sweep) -> float:
+def largest_deviation_difference(sweep: VarianceSweep, reference_sweep: VarianceSweep) -> float:
     """Largest difference of standard deviations between two sweeps, where both are finite, divided by the output's
     largest standard deviation on any road.
     """
@@ -71,7 +71,7 @@ def largest_deviation_difference(sweep: Sweep, reference_sweep: Sweep) -> float:
 
 
 def largest_deviation_errors(
-    sweep: Sweep, case_index: int, true_deviations: np.ndarray, output_names: list[str]
+    sweep: VarianceSweep, case_index: int, true_deviations: np.ndarray, output_names: list[str]
 ) -> np.ndarray:
     """Largest relative error (outputs,) over the speeds of the standard deviations in a case of a sweep, compared with
     true standard deviations (speeds, outputs).
@@ -89,7 +89,7 @@ def largest_deviation_errors(
 
 
 def quasi_stationary_errors(
-    varying_speed_deviations: VaryingSpeed, quasi_stationary_deviations: np.ndarray
+    varying_speed_deviations: VaryingSpeedDeviations, quasi_stationary_deviations: np.ndarray
 ) -> np.ndarray:
     """Errors (instants, outputs) of quasi-stationary standard deviations along a drive, divided by each output's
     largest standard deviation in the drive; 0 where an output does not move.

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 from models.core.scene_effects import scene_without as without_own
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import Freedom, Limits, SpatialVehicle
@@ -50,7 +50,7 @@ class ReducedScene:
         ride = without_own(self.ride_scene, *table_names)
         return replace(self, ride_scene=ride, vehicle=vehicle_of(ride))
 
-    def excitation(self) -> Excitation:
+    def excitation(self) -> RoadExcitation:
         """Returns the road's excitation of the wheels; axles that meet the same heights at the same time share one
         filter.
         """

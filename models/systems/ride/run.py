@@ -71,7 +71,7 @@ def run(
     progress : called during such a run. error : whether errors are estimated, by further solutions or runs. Assumptions
     are always checked.
 
-    The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``NonlinearRide`` or, for an engine in time, a
+    The result's detail is a ``VarianceSweep``, a ``VaryingSpeedDeviations``, a ``NonlinearRide`` or, for an engine in time, a
     ``EngineRide``.
     """
     engine = engine or "reference"

@@ -11,7 +11,7 @@ import numpy as np
 from models.core.assumptions import Gaussian
 from models.core.errors import InputError
 from models.ride.sweep import variance_sweep
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.systems.ride.of_scene import GRAVITY, LinearVehicleAtSpeed
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.linear_vehicle import LinearVehicle, Output
@@ -97,7 +97,7 @@ class SpectralMotion:
 
     vehicle: SpatialVehicle
     linear: LinearVehicleAtSpeed
-    road: Excitation
+    road: RoadExcitation
     speeds: Sequence[float]
     means: Mapping[str, np.ndarray]
 

@@ -12,7 +12,7 @@ from models.core.errors import InputError
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict, quantity
 from models.rail.contact_table import CELLS_PER_STRIP, WheelsetContact
-from models.rail.laid_profiles import Profiles
+from models.rail.laid_profiles import CrossSections
 from models.systems.contact.scene import WheelRailBodies
 
 LARGEST_CELL_COUNT = 300
@@ -65,7 +65,7 @@ class WheelRailScene(SceneFile):
     system: Literal["wheel-rail"] = "wheel-rail"
     study: str = Field(default="manchester", description="the study that runs the scene")
     bodies: WheelRailBodies = WheelRailBodies()
-    profiles: Profiles = Profiles()
+    profiles: CrossSections = CrossSections()
     wheelset: WheelsetOnRails = WheelsetOnRails()
     positions: LateralPositions = LateralPositions()
     method: PatchCells = PatchCells()

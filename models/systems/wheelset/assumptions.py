@@ -9,8 +9,8 @@ from models.contact.limits import FAST_SLIP, LARGEST_AXIS_SHARE, LINEAR_FORCE_SH
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
 from models.rail import wheel_forces as wf
-from models.rail.equations import ROLL, YAW, Equations, WheelsetPath, Y
-from models.rail.flange_climbing import bound_shares, nadal_limit
+from models.rail.equations import ROLL, YAW, WheelsetEquations, WheelsetPath, Y
+from models.rail.flange_climbing import nadal_limit, shares_of_bounds
 from models.rail.wheelset import Wheelset
 
 LEAST_LOAD = 0.05
@@ -29,7 +29,7 @@ LEAST_FRICTION = 0.02
 """Coefficient of friction below which wheels slide instead of creep, so that eigenvalues mean nothing."""
 
 
-def assumptions(equations: Equations) -> list[Assumption]:
+def assumptions(equations: WheelsetEquations) -> list[Assumption]:
     """Assumptions of the equations of a wheelset at a speed. They are checked on the path, the detail of a result."""
     wheelset = equations.wheelset
     listed = [
@@ -133,7 +133,7 @@ def _small_yaw_assumption() -> Assumption:
     )
 
 
-def _rolling_assumption(equations: Equations) -> Assumption:
+def _rolling_assumption(equations: WheelsetEquations) -> Assumption:
     return Assumption(
         "speed",
         "the wheelset rolls so fast that creepage is by its speed",
@@ -178,7 +178,7 @@ def _elastic_assumption() -> Assumption:
     )
 
 
-def _slow_slip_assumption(equations: Equations) -> Assumption:
+def _slow_slip_assumption(equations: WheelsetEquations) -> Assumption:
     speed = max(abs(equations.speed), wf.REGULARISED_SPEED)
     return Assumption(
         "constant friction",
@@ -194,7 +194,7 @@ def _no_slip_assumption(wheelset: Wheelset) -> Assumption:
     def watched(wheelset_path: WheelsetPath) -> Watched:
         contacts = wheelset_path.contacts
         creep, limit = np.hypot(contacts["fx"], contacts["fy"]), contacts["load"]
-        used = bound_shares(creep, wheelset.friction * limit)
+        used = shares_of_bounds(creep, wheelset.friction * limit)
         return {"patches": used.max(axis=1)}
 
     return Assumption(
@@ -228,7 +228,7 @@ def _travel_assumption(wheelset: Wheelset) -> Assumption:
 
 def _climbing_assumption(wheelset: Wheelset) -> Assumption:
     def watched(wheelset_path: WheelsetPath) -> Watched:
-        flange_share = bound_shares(wheelset_path.contacts["flange_force"], wheelset_path.contacts["load"])
+        flange_share = shares_of_bounds(wheelset_path.contacts["flange_force"], wheelset_path.contacts["load"])
         return {"right wheel": flange_share[:, 0], "left wheel": flange_share[:, 1]}
 
     return Assumption(

@@ -12,7 +12,7 @@ from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.tables import write_table
 from models.rail.equivalent_conicity import ConicityRow, conicity_row
-from models.rail.laid_profiles import Profiles
+from models.rail.laid_profiles import CrossSections
 from models.rail.rolling_radius_table import RollingRadiusTable, read_rolling_radii, rolling_radii_of
 from models.rail.wheelset import Wheelset
 from models.systems.wheelset.of_scene import wheelset_of
@@ -90,7 +90,7 @@ def check(scene: WheelsetScene) -> None:
         _left_profiles(scene, conicity_table, profiles)
 
 
-def _left_profiles(scene: WheelsetScene, conicity_table: ConicityTable, profiles: Profiles) -> Profiles:
+def _left_profiles(scene: WheelsetScene, conicity_table: ConicityTable, profiles: CrossSections) -> CrossSections:
     """Profiles of the left wheel and rail: as [conicity] names them, else the right side's."""
     named = {
         key: value

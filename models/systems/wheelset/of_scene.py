@@ -10,14 +10,14 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects
 from models.core.scene_file import existing_file, parse
-from models.rail.equations import YAW, Equations
+from models.rail.equations import YAW, WheelsetEquations
 from models.rail.linear import critical_speed_or_reason
 from models.rail.wheelset import CHOSEN_WHEELSET, Wheelset
 from models.systems.wheelset.scene import WheelsetScene
 
 PARAMETER_SETS = {"chosen": CHOSEN_WHEELSET}
 IMPLEMENTATION_MODULES = {
-    "reference": "models.rail.equations.Equations",
+    "reference": "models.rail.equations.WheelsetEquations",
     "exudyn": "models.engines.wheelset.ExudynWheelset",
     "mujoco": "models.engines.wheelset.MujocoWheelset",
 }
@@ -62,7 +62,7 @@ def _checked_wheelset(parameter_values: dict[str, Any], named_file: str, named_t
         raise InputError(named_file, key_path, error.value, error.allowed) from None
 
 
-def equations_class(engine: str) -> type[Equations]:
+def equations_class(engine: str) -> type[WheelsetEquations]:
     """Returns the class of the equations of motion in "reference", "exudyn" or "mujoco"; no other engine is
     imported.
     """
@@ -70,7 +70,7 @@ def equations_class(engine: str) -> type[Equations]:
     return getattr(import_module(module), name)
 
 
-def equations_of(scene: WheelsetScene, engine: str, speed: float) -> Equations:
+def equations_of(scene: WheelsetScene, engine: str, speed: float) -> WheelsetEquations:
     """Equations of motion of the scene's wheelset, with its law of creep, at a speed (m/s)."""
     return equations_class(engine)(wheelset_of(scene), speed, scene.contact.law, scene.contact.cells)
 
@@ -78,7 +78,7 @@ def equations_of(scene: WheelsetScene, engine: str, speed: float) -> Equations:
 @lru_cache(32)
 def _equations_and_state(
     engine: str, wheelset: Wheelset, speed: float, creep_law: Any, cell_count: int, lateral_shift: float, yaw: float
-) -> tuple[Equations, np.ndarray]:
+) -> tuple[WheelsetEquations, np.ndarray]:
     """Equations of motion in an engine, and the state (10,) at rest on the rails with a lateral displacement (m) and a
     yaw (rad).
     """
@@ -88,7 +88,7 @@ def _equations_and_state(
     return equations, state
 
 
-def equations_and_start(scene: WheelsetScene, engine: str, speed: float) -> tuple[Equations, np.ndarray]:
+def equations_and_start(scene: WheelsetScene, engine: str, speed: float) -> tuple[WheelsetEquations, np.ndarray]:
     """Returns the equations of motion at a speed (m/s), and the state (10,) in which the scene's paths begin. Both are
     cached for further paths.
     """

@@ -17,13 +17,19 @@ from models.core.result import Channel, Result, join_results, result
 from models.core.told import joined_result
 from models.ensemble.runner import block_results
 from models.ensemble.workers import Crew, folders_for_workers
-from models.rail.eigenvalues import hunting_eigenvalue, hunting_uncertainty, largest_growth, root_locus, wavelength
+from models.rail.eigenvalues import (
+    hunting_eigenvalue,
+    hunting_uncertainty,
+    hunting_wavelength,
+    largest_growth_rate,
+    root_locus,
+)
 from models.rail.equations import ROLL, SPIN, YAW, WheelsetPath, Y, Z
 from models.rail.limit_cycle import (
     Orbit,
     SoughtQuantity,
-    attained_cycle,
-    bifurcation,
+    attained_limit_cycle,
+    bifurcation_orbit,
     guess_from_orbit,
     refined_orbit,
     solved_orbit,
@@ -157,8 +163,8 @@ def linearised_result(scene: WheelsetScene, engine: str, *, estimate_error: bool
     linear = LinearisedMotion(
         speeds,
         root_locus(kind, wheelset, speeds),
-        wavelength(kind, wheelset),
-        *critical_speed_or_reason(wheelset, partial(largest_growth, kind)),
+        hunting_wavelength(kind, wheelset),
+        *critical_speed_or_reason(wheelset, partial(largest_growth_rate, kind)),
     )
     channels = {
         name: Channel(("speed", "eigenvalue"), part_of_values, "1/s")
@@ -193,7 +199,7 @@ def branch_result(
     equations = equations_of(scene, "reference", float(speeds[-1]))
     with Crew.of(scene, default_workers=1).at_work(TIMED_MARCH_PAIR_COUNT, *folders_for_workers(scene)) as pool:
         try:
-            for orbit in bifurcation(equations, float(speeds.min()), float(speeds.max()), scene.run.step, pool):
+            for orbit in bifurcation_orbit(equations, float(speeds.min()), float(speeds.max()), scene.run.step, pool):
                 orbits.append(orbit)
                 report_progress(len(orbits))
         except NoCriticalSpeed as no_speed:
@@ -240,7 +246,7 @@ def _cycle_reached_at_speed(scene: WheelsetScene, speed: float) -> Orbit | None:
 
 def _attained_in_engine(scene: WheelsetScene, speed: float) -> Orbit | None:
     """Returns the limit cycle that a motion in the reference reaches at a speed (m/s), or None where it dies out."""
-    return attained_cycle(
+    return attained_limit_cycle(
         equations_of(scene, "reference", speed), initial_displacement=scene.run.displacement, time_step=scene.run.step
     )
 

@@ -14,7 +14,7 @@ from models.core.scene_file import SceneFile, checked
 from models.core.speeds import Speeds, check_speeds
 from models.core.steps import MOST_STEPS, divides, dividing_step
 from models.core.strict import Strict, quantity
-from models.rail.laid_profiles import Profiles
+from models.rail.laid_profiles import CrossSections
 
 HIGHEST_SPEED = 200.0
 """Highest speed (m/s) that a scene may have."""
@@ -88,7 +88,7 @@ class WheelsetScene(SceneFile):
     system: Literal["wheelset"] = "wheelset"
     study: str = Field(default="wheelset", description="the study that runs the scene")
     wheelset: WheelsetTable = WheelsetTable()
-    profiles: Profiles | None = Field(default=None, description="cross-sections in place of cones and round heads")
+    profiles: CrossSections | None = Field(default=None, description="cross-sections in place of cones and round heads")
     contact: CreepLawTable = CreepLawTable()
     speeds: Speeds = Field(description="table with a range of speeds, or a list of them")
     run: WheelsetRunTable = WheelsetRunTable()

@@ -17,7 +17,7 @@ from models.ride.excited import vehicle_with_road
 from models.ride.nonlinear_copies import copies_in_time
 from models.ride.road_path import RoadPath
 from models.ride.varying_speed import LARGEST_RATE_TIMES_STEP, varying_speed
-from models.road.excitation import Excitation
+from models.road.excitation import RoadExcitation
 from models.systems.ride.nonlinear import (
     RUNGE_KUTTA_ORDER,
     RunSampling,
@@ -103,7 +103,7 @@ def _sample_of_sweep(generator: np.random.Generator, sample_number: int) -> Samp
     )
 
 
-def exact_deviations(linear_vehicle: LinearVehicle, road_excitation: Excitation, speed: float) -> np.ndarray:
+def exact_deviations(linear_vehicle: LinearVehicle, road_excitation: RoadExcitation, speed: float) -> np.ndarray:
     """Standard deviations (p,) of the outputs of a linear vehicle with undamped tyres, computed in extended
     precision."""
     system, n, m = (
@@ -243,7 +243,7 @@ def _road_path_of_run(
     engine: str,
     vehicle: SpatialVehicle,
     sampling: RunSampling,
-    road_excitation: Excitation,
+    road_excitation: RoadExcitation,
     speed: float,
 ) -> RoadPath:
     """Road path with the step that ``in_engine`` uses."""

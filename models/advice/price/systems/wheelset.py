@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from models.advice.price.meshed import SECOND_SOLVER_TOLERANCE, MeshedScene, checked_quantity, duration_of_first_part
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
-from models.rail.equations import ALLOWED_STEP_RATE, Equations, WheelsetPath
+from models.rail.equations import ALLOWED_STEP_RATE, WheelsetEquations, WheelsetPath
 from models.systems.wheelset.of_scene import equations_and_start, path_speeds, wheelset_of
 from models.systems.wheelset.run import CONTACT_CHANNELS, STATE_CHANNELS, path_result, simulated_path
 from models.systems.wheelset.scene import WheelsetScene
@@ -64,7 +64,7 @@ class PricedWheelset(MeshedScene):
         return [*cells, "[run]", step, f"# twinrig run SCENE --engine {setting.engine}"]
 
 
-def _exact_path(equations: Equations, start_state: np.ndarray, step: float, duration: float) -> WheelsetPath:
+def _exact_path(equations: WheelsetEquations, start_state: np.ndarray, step: float, duration: float) -> WheelsetPath:
     """A wheelset's path by a Runge-Kutta method of order 8 with automatic steps; RunFailed where it gives up."""
     times = step * np.arange(round(duration / step) + 1)
     scale = np.maximum(np.abs(start_state), 1e-3)
@@ -92,7 +92,8 @@ def priced_scene(scene: WheelsetScene, quantity: str | None, engines: tuple[str,
     )
     speeds, run = tuple(path_speeds(scene)), scene.run
     fastest = max(
-        float(np.abs(np.linalg.eigvals(Equations(wheelset, speed, contact.law).state_matrix)).max()) for speed in speeds
+        float(np.abs(np.linalg.eigvals(WheelsetEquations(wheelset, speed, contact.law).state_matrix)).max())
+        for speed in speeds
     )
     longest, cells = 0.95 * ALLOWED_STEP_RATE / fastest, contact.cells if contact.law == "fastsim" else 0
     note = f"all paths together, at {' and '.join(f'{speed:g}' for speed in speeds)} m/s"

@@ -130,7 +130,7 @@ def _road_profile(scene: Any, road_parameters: Parameters, driven_distance: floa
 
 
 def _measured_road(scene: Any, road_parameters: Parameters, driven_distance: float) -> Any:
-    from models.road.continuation import RUN_IN_LENGTH, continued_road, run_in
+    from models.road.continuation import RUN_IN_LENGTH, continued_road, road_with_run_in
 
     path, track = scene.path(road_parameters.file, "effects.road.file"), road_parameters.track or "mean"
     length = RUN_IN_LENGTH if road_parameters.run_in is None else road_parameters.run_in
@@ -147,7 +147,7 @@ def _measured_road(scene: Any, road_parameters: Parameters, driven_distance: flo
     _check_length(scene, road_parameters, raw, driven_distance, length)
     longer = continued_road(raw, str(road_parameters.beyond_end), driven_distance, path)
     assert isinstance(longer, type(raw))
-    return run_in(longer, length)
+    return road_with_run_in(longer, length)
 
 
 def _check_length(
