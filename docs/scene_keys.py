@@ -38,7 +38,7 @@ READER_FIELDS = ("file", "folder")
 """Fields of a scene that are no keys, but state where it was read."""
 OTHER_TABLES = (
     ("Vehicle files", "models.vehicles.vehicle_tables", "VehicleTable"),
-    ("Parameters of the pitch-plane vehicle", "models.vehicles.pitch_plane", "Parameters"),
+    ("Parameters of the pitch-plane vehicle", "models.vehicles.pitch_plane", "PitchPlaneParameters"),
     ("Parameters of a wheelset", "models.rail.wheelset", "Wheelset"),
     ("Parameters of a bicycle", "models.bicycle.whipple", "Whipple"),
     ("Parameters of a braked vehicle", "models.brake.plane_vehicle", "Truck"),

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import models
-from models.engines.reference import derivative_of, march_of
+from models.engines.reference import compiled_derivative, compiled_march
 from models.machine import compiled
 
 MODES = (
@@ -23,7 +23,7 @@ MODES = (
 
 
 def test_no_two_kernels_share_a_cache_file():
-    names = [make(*mode)._cache._impl.filename_base for make in (march_of, derivative_of) for mode in MODES]
+    names = [make(*mode)._cache._impl.filename_base for make in (compiled_march, compiled_derivative) for mode in MODES]
     assert len(set(names)) == len(names)
 
 
@@ -31,7 +31,7 @@ def test_two_processes_never_write_the_same_file(tmp_path):
     """Both read an empty index, then each keeps its own signature: numba's own names would be one and the same."""
     from numba.core.caching import IndexDataCacheFile
 
-    file = march_of("road", "exact")._cache._cache_file
+    file = compiled_march("road", "exact")._cache._cache_file
     assert file._data_name(1) != file._data_name(1)
     plain = IndexDataCacheFile(str(tmp_path), "kernel", None)
     assert plain._data_name(1) == plain._data_name(1)  # as soon as this fails, numba has its own cure

@@ -16,7 +16,7 @@ from models.systems.hub_forces.measurement import Angles, HubForces, recorded_me
 from models.systems.hub_forces.run import inputs_with_angles, run
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import Deviations, estimate, inputs_with_moments
-from models.vehicles.cut_vehicle import PITCH, ROLL, cut, rigid_vehicle
+from models.vehicles.cut_vehicle import PITCH, ROLL, cut_at_hubs, rigid_vehicle
 from models.vehicles.spatial_linear import linearise
 from studies.hub_forces import save
 from validation.cases import hub_forces as case
@@ -32,7 +32,7 @@ def test_the_quick_share_passes(tmp_path):
 
 def test_without_symmetry_the_engines_agree_too():
     # 1e-10: a wrong product of inertia or arm would show at 1e-2
-    assert all(row.status == "passed" for row in case._acceleration_rows("twin", cut(twin(), "body")))
+    assert all(row.status == "passed" for row in case._acceleration_rows("twin", cut_at_hubs(twin(), "body")))
 
 
 @pytest.mark.grounds("plain counterpart")

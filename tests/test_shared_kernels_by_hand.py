@@ -9,7 +9,7 @@ from numpy.polynomial import polynomial
 from models.brake.brake import Brake, of_wheels
 from models.brake.controllers.five_phase_cycle import WheelState, time_to_corner
 from models.core.piecewise import evaluate, interpolate
-from models.multibody.tree import add, cross, dot, plus, times
+from models.multibody.tree import add_three, cross, dot, plus, times
 from models.road.kernels import cubics_uniform
 
 pytestmark = pytest.mark.grounds("closed form")
@@ -70,5 +70,5 @@ def test_vectors_of_three_numbers():
     assert cross(left, right) == CLOSE(tuple(np.cross(a, b)), rel=1e-13)
     assert times(left, 0.7) == CLOSE(tuple(0.7 * a)) and plus(left, right) == CLOSE(tuple(a + b))
     numbers = np.arange(6.0)
-    add(numbers, 2, left)
+    add_three(numbers, 2, left)
     assert numbers == CLOSE(np.arange(6.0) + np.array([0, 0, *a, 0]))

@@ -20,12 +20,12 @@ from models.systems.hub_forces.scene import COLUMNS_OF_ANGLES, COLUMNS_OF_HUB, H
 from models.systems.measured.run import run as run_recording
 from models.systems.measured.scene import build as recording
 from models.tyre.assumptions import assumptions as of_table
-from models.vehicles.cut_vehicle import cut
+from models.vehicles.cut_vehicle import cut_at_hubs
 from models.vehicles.vehicle_file import load_vehicle
 from studies.tyre import run as read_tyre
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
-CAR = cut(load_vehicle("r19_free"), "body")
+CAR = cut_at_hubs(load_vehicle("r19_free"), "body")
 
 
 def scene(road: dict | None = None, **tables: dict) -> HubScene:

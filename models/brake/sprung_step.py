@@ -49,7 +49,7 @@ from models.multibody.forces import (
     workspace_size,
 )
 from models.multibody.moving_vehicle import WheelContact
-from models.multibody.tree import PER_LINK, dot, three, times, twist
+from models.multibody.tree import PER_LINK, add_body_moment, dot, three_from, times
 
 VALUES_PER_WHEEL = 4
 """Number of values that stay constant over a step for each wheel."""
@@ -112,12 +112,12 @@ def forces_and_contacts(table, q, v, force_sum, contacts):
     for i in range(int(table[TYRES])):
         tyre_row = row(tyres, PER_TYRE, i)
         find_contact(tyre_row, waves, int(table[WAVES]), wheel_forces.steer[i], 0.0, vehicle, wheel)
-        contacts.along[i] = dot(three(wheel_geometry, PASSING), three(wheel_geometry, ROLLING))
+        contacts.along[i] = dot(three_from(wheel_geometry, PASSING), three_from(wheel_geometry, ROLLING))
         contacts.across[i], contacts.load[i] = wheel.report[SLIP_Y], wheel.report[PRESS]
         creeping[0], creeping[1] = wheel_forces.force_x[i], wheel_forces.force_y[i]
         add_creep_forces(tyre_row, creeping, vehicle, wheel)
         carrying = row(vehicle.tree.links, PER_LINK, int(tyre_row[CARRYING]))
-        twist(carrying, vehicle.tree.ground, times(three(wheel_geometry, AXLE), -wheel_forces.moment[i]))
+        add_body_moment(carrying, vehicle.tree.ground, times(three_from(wheel_geometry, AXLE), -wheel_forces.moment[i]))
     finish_forces(table, vehicle)
 
 

@@ -9,7 +9,7 @@ from mujoco import rollout
 from models.core.errors import RunFailed
 from models.core.waiting import simulation_progress
 from models.engines.mujoco_quiet import without_warnings
-from models.engines.protocol import guard
+from models.engines.protocol import check_trajectory
 
 STEPS_PER_CHUNK = 4096
 """Number of steps between two checks of a run."""
@@ -46,7 +46,7 @@ def march(
             late = np.abs(rows[:, 0] - times[first + 1 : last + 1]) > 1e-6 * times[-1]
             if late.any() or warning_text(mujoco_data):
                 end = first + (int(np.argmax(late)) if late.any() else len(rows))
-                guard("mujoco", times[: end + 1], path[: end + 1, 1:], times[end])
+                check_trajectory("mujoco", times[: end + 1], path[: end + 1, 1:], times[end])
                 raise RunFailed("mujoco", f"{GAVE_UP}{warning_text(mujoco_data)}", times[end], path[end, 1:])
     return path[:, 1:]
 

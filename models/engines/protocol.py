@@ -117,7 +117,7 @@ def settings_of(engine: str, run_settings: Settings | None) -> Settings:
     return run_settings
 
 
-def guard(
+def check_trajectory(
     engine: str,
     times: np.ndarray,
     states: np.ndarray,

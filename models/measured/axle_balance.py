@@ -17,7 +17,7 @@ from models.drift.growth import RigidPitch, rigid_pitch
 from models.measured.ratios import NEGLIGIBLE_MEAN_SHARE, WrongFactor
 from models.measured.recording import Recording
 from models.measured.signal import Signal
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 FORCE_PLACES = {"front": ("front", "front left", "front right"), "rear": ("rear", "rear left", "rear right")}
 """Locations at which vertical forces may be measured: at an axle, or at its wheels, whose forces are added."""
@@ -56,7 +56,7 @@ class AxleForces:
 
     forces: np.ndarray
     period: float
-    parameters: Parameters
+    parameters: PitchPlaneParameters
     signals: tuple[tuple[Signal, ...], tuple[Signal, ...]]
     duration: float
     remedies: Mapping[WrongFactor, str] | None = None
@@ -141,7 +141,7 @@ def axle_signals(recording: Recording, axle: str) -> list[Signal]:
     return whole or vertical
 
 
-def axle_forces_of(recording: Recording, parameters: Parameters) -> AxleForces | None:
+def axle_forces_of(recording: Recording, parameters: PitchPlaneParameters) -> AxleForces | None:
     """``AxleForces`` of a recording, gaps bridged by straight lines; None where an axle lacks a wheel's signal."""
     signals = tuple(tuple(axle_signals(recording, axle)) for axle in FORCE_PLACES)
     if not all(
@@ -248,6 +248,6 @@ def _block_means(values: np.ndarray) -> np.ndarray:
     return np.array([block.mean(axis=0) for block in blocks])
 
 
-def _axle_masses(p: Parameters) -> np.ndarray:
+def _axle_masses(p: PitchPlaneParameters) -> np.ndarray:
     """Mass (2,) in kg carried by each axle, wheels included."""
     return np.array([p.m3 * p.a / (p.a + p.b) + p.m1, p.m3 * p.b / (p.a + p.b) + p.m2])

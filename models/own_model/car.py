@@ -22,7 +22,7 @@ from models.own_model.names import coordinate_of, label, moving_bodies
 from models.own_model.reading import body_loads, joint_elements, line_springs
 from models.own_model.wheel_sites import WheelSite, wheel_sites
 from models.own_model.xml_guard import Document, checked_document
-from models.vehicles.free_vehicle import CARRIER, SWAY, rotor
+from models.vehicles.free_vehicle import CARRIER, SWAY, rotor_name
 from models.vehicles.spatial import (
     JointElement,
     PartOutput,
@@ -35,7 +35,7 @@ from models.vehicles.spatial import (
     TyreOutput,
     Vector,
 )
-from models.vehicles.spatial_linear import preloads
+from models.vehicles.spatial_linear import static_preloads
 from models.vehicles.vehicle_checks import check_vehicle
 
 CONTACT_CONTENT = "contact"
@@ -167,7 +167,7 @@ class _Reader:
     def _without_preloads(self, vehicle: SpatialVehicle) -> SpatialVehicle:
         """The vehicle without preloads, since its springs will get the preloads that balance its weight. A note lists
         where the file's preloads differ."""
-        held = preloads(replace(vehicle, gravity=GRAVITY)).parts
+        held = static_preloads(replace(vehicle, gravity=GRAVITY)).parts
         changed = [
             f"{e.name} {held[e.name]:.4g} for {e.preload:.4g}"
             for e in vehicle.joint_elements
@@ -182,7 +182,7 @@ class _Reader:
 
 def _reserved_names(wheels: tuple[WheelSite, ...]) -> set[str]:
     """Names of bodies that a system adds to a car, so that the file's bodies cannot have them."""
-    return {CARRIER, SWAY, *(rotor(wheel.name) for wheel in wheels)}
+    return {CARRIER, SWAY, *(rotor_name(wheel.name) for wheel in wheels)}
 
 
 def _tyre(wheel: WheelSite, merged_bodies: CarBodies) -> Tyre:

@@ -16,7 +16,7 @@ from models.own_model.car_joints import Roles, freedom_of, joint_text, joints_of
 from models.own_model.names import moving_bodies
 from models.own_model.wheel_sites import SAME_AXLE_DISTANCE, WheelSite
 from models.own_model.xml_guard import Document
-from models.vehicles.spatial import FREEDOMS, Body, Freedom, Vector, steiner
+from models.vehicles.spatial import FREEDOMS, Body, Freedom, Vector, point_mass_inertia
 
 REVOLUTION_TOLERANCE = 1e-9
 """Share of a wheel's inertia by which it may differ from the inertia of a body of revolution about its axle."""
@@ -214,7 +214,7 @@ def combined_mass(masses: list[Mass]) -> Mass:
     total = sum(each.mass for each in masses)
     shares = [each.mass / total if total else 1.0 / len(masses) for each in masses]
     centre = np.sum([share * each.centre for share, each in zip(shares, masses, strict=True)], axis=0)
-    inertia = np.sum([each.inertia + steiner(each.mass, each.centre - centre) for each in masses], axis=0)
+    inertia = np.sum([each.inertia + point_mass_inertia(each.mass, each.centre - centre) for each in masses], axis=0)
     return Mass(total, centre, inertia)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from models.engines.free_vehicle import Driven
+from models.engines.free_vehicle import LoadedVehicle
 from models.engines.native_parts import BodyLoad, DryFriction, GroundSpring, LineSpring, TurningSpring, joint_parts
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, Coordinates
 from models.own_model.equalities import connections, joint_couplings, stiffness_and_damping
@@ -42,7 +42,7 @@ class TwinModel:
 
     name: str
     model: mujoco.MjModel
-    driven: Driven
+    driven: LoadedVehicle
     coordinates: Coordinates
 
     @property
@@ -75,7 +75,7 @@ def described_model(mujoco_model: mujoco.MjModel, file_name: str) -> TwinModel:
     parts = joint_parts(vehicle)
     turns = tuple(turning_springs(mujoco_model, design))
     pushes = tuple(body_loads(mujoco_model, design))
-    driven = Driven(vehicle, gravity, np.zeros(1), None, None, parts, loads, lines, *ties, turns, pushes)
+    driven = LoadedVehicle(vehicle, gravity, np.zeros(1), None, None, parts, loads, lines, *ties, turns, pushes)
     return TwinModel(file_name, mujoco_model, driven, Coordinates(mujoco_model, design))
 
 

@@ -16,7 +16,7 @@ from models.core.errors import InputError
 from models.own_model.file import ModelFile
 from models.own_model.names import label
 from models.own_model.urdf_text import parsed_root
-from models.vehicles.spatial import steiner
+from models.vehicles.spatial import point_mass_inertia
 
 PARSER_TOLERANCE = 1e-6
 """Relative difference allowed between file and parser: the parser keeps all digits, yet computing principal axes costs
@@ -65,7 +65,7 @@ class _LinkMass:
             return
         total = self.mass + mass
         middle = (self.mass * self.centre + mass * centre) / total if total else centre
-        moved = steiner(self.mass, self.centre - middle) + steiner(mass, centre - middle)
+        moved = point_mass_inertia(self.mass, self.centre - middle) + point_mass_inertia(mass, centre - middle)
         self.mass, self.centre, self.inertia = total, middle, self.inertia + inertia + moved
 
 

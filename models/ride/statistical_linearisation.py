@@ -20,7 +20,7 @@ from models.ride.covariance import StationaryCovariance, stationary_covariance
 from models.ride.excited import DelayedSystem, vehicle_with_road
 from models.ride.gaussian_laws import linearised_rate_law, linearised_travel_law
 from models.road.excitation import Excitation
-from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
+from models.vehicles.linear_vehicle import LinearOutput, LinearVehicle, WheelPosition
 from models.vehicles.spatial import PartKind, PartOutput, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import Gains, linearise
 
@@ -315,7 +315,9 @@ def _vehicle_under_forces(linear: LinearVehicle, rows: np.ndarray, direct_effect
     of the forces on the outputs."""
     no_roads = np.zeros(len(rows))
     outputs = tuple(
-        Output(o.name, o.unit, o.kind, o.acceleration_factors, o.rate_factors, o.displacement_factors, read, no_roads)
+        LinearOutput(
+            o.name, o.unit, o.kind, o.acceleration_factors, o.rate_factors, o.displacement_factors, read, no_roads
+        )
         for o, read in zip(linear.outputs, direct_effects, strict=True)
     )
     wheels = tuple(WheelPosition(str(i), 0.0, 0.0, 0) for i in range(len(rows)))

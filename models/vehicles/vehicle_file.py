@@ -17,9 +17,9 @@ from models.vehicles.spatial import (
     Body,
     Curve,
     Drag,
-    Limits,
     PartOutput,
     PointOutput,
+    ReductionLimits,
     SideForce,
     SpatialOutput,
     SpatialVehicle,
@@ -97,10 +97,10 @@ def vehicle_path(vehicle_name: str, scene_folder: str | Path = ".", scene_path: 
 
 def build_vehicle(file_table: Mapping[str, Any], vehicle_file: str) -> SpatialVehicle:
     """The vehicle from nested tables as a TOML file contains them. Raises InputError for the first fault."""
-    return _Builder(_read(file_table, vehicle_file), vehicle_file).vehicle()
+    return _VehicleBuilder(_checked_tables(file_table, vehicle_file), vehicle_file).vehicle()
 
 
-def _read(file_table: Mapping[str, Any], vehicle_file: str) -> VehicleTable:
+def _checked_tables(file_table: Mapping[str, Any], vehicle_file: str) -> VehicleTable:
     """Checked tables of a vehicle file. An error inside a list of tables is reported with the name of the entry."""
     try:
         return read(VehicleTable, file_table, vehicle_file)
@@ -119,7 +119,7 @@ def _key_path(table_name: str, entry_name: object, entry_key: str = "") -> str:
     return f"{table_name}[{entry_name}]" + (f".{entry_key}" if entry_key else "")
 
 
-class _Builder:
+class _VehicleBuilder:
     """Builder of the parts of a vehicle from the tables of a vehicle file."""
 
     def __init__(self, vehicle_table: VehicleTable, vehicle_file: str) -> None:
@@ -156,7 +156,7 @@ class _Builder:
         check_vehicle(vehicle, self.file)
         return replace(vehicle, limits=self._limits(vehicle))
 
-    def _limits(self, vehicle: SpatialVehicle) -> Limits:
+    def _limits(self, vehicle: SpatialVehicle) -> ReductionLimits:
         table, places = self.tables.reduced or ReducedTable(), vehicle.coordinates()
         known = (
             ("massless", table.massless, "body", tuple(self.bodies)),
@@ -167,7 +167,7 @@ class _Builder:
             for name in names:
                 self._known_name(f"reduced.{key}", name, kind, choices)
         locked = frozenset(place for place in places if list(place) in table.locked)
-        return Limits(frozenset(table.massless), frozenset(table.rigid), locked)
+        return ReductionLimits(frozenset(table.massless), frozenset(table.rigid), locked)
 
     def _require(
         self, condition: Any, key_path: str, wrong_value: Any, allowed_text: str, allowed_names: Sequence[str] = ()
@@ -206,14 +206,14 @@ class _Builder:
             assert ready is not None
             (xx, yy, zz), (xy, xz, yz) = ready.inertia, ready.products
             inertia = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-            at, freedoms = _vector(ready.position), tuple(ready.freedoms)
+            at, freedoms = _vector_of_numbers(ready.position), tuple(ready.freedoms)
             whole = Body(ready.name, ready.mass, at, freedoms, inertia, ready.parent)
             if ready.hitch is not None:
-                hitch = self._hitch(whole, _vector(ready.hitch))
+                hitch = self._hitch(whole, _vector_of_numbers(ready.hitch))
                 done[hitch.name], whole = hitch, replace(whole, freedoms=(), parent=hitch.name)
             done[ready.name] = whole
             del waiting[ready.name]
-        return done | {s.name: Body(s.name, s.mass, _vector(s.position), ("z",)) for s in self.tables.seats}
+        return done | {s.name: Body(s.name, s.mass, _vector_of_numbers(s.position), ("z",)) for s in self.tables.seats}
 
     def _hitch(self, towed_body: Body, hitch_point: Vector) -> Body:
         """Massless body with the rotations of a towed body, at the point where its parent tows it."""
@@ -294,7 +294,7 @@ class _Builder:
         both = (spring_table.point is None) != (spring_table.points is None)
         self._require(both, f"{key_path}.point", None, "give either point, the place of both ends, or points, both")
         first, second = (spring_table.point, spring_table.point) if spring_table.points is None else spring_table.points
-        return _vector(first), _vector(second)
+        return _vector_of_numbers(first), _vector_of_numbers(second)
 
     def _axis(self, key_path: str, spring_table: SpringTable, points: tuple[Vector, Vector]) -> Vector:
         """Unit vector of a spring's axis: the given direction, else from the second point to the first, else
@@ -303,12 +303,12 @@ class _Builder:
             return self._unit(f"{key_path}.direction", spring_table.direction)
         apart = np.subtract(*points)
         distance = float(np.linalg.norm(apart))
-        return _vector(apart / distance) if distance else (0.0, 0.0, 1.0)
+        return _vector_of_numbers(apart / distance) if distance else (0.0, 0.0, 1.0)
 
     def _unit(self, key_path: str, direction: Sequence[float]) -> Vector:
         length = float(np.linalg.norm(direction))
         self._require(length, key_path, list(direction), "a direction needs a length")
-        return _vector(np.array(direction) / length)
+        return _vector_of_numbers(np.array(direction) / length)
 
     def _curve(self, key_path: str, curve_table: CurveTable | None) -> Curve | None:
         if curve_table is None:
@@ -324,19 +324,19 @@ class _Builder:
 
     def _mounts(self) -> Iterator[SpringDamper]:
         for mount in self.tables.mounts:
-            ends, at = self._two_bodies(_key_path("mounts", mount.name), mount.bodies), _vector(mount.point)
+            ends, at = self._two_bodies(_key_path("mounts", mount.name), mount.bodies), _vector_of_numbers(mount.point)
             acts = any(mount.stiffness) or any(mount.damping)
             place = _key_path("mounts", mount.name, "stiffness")
             self._require(acts, place, mount.stiffness, "has neither spring nor damper")
             frame = self._frame(_key_path("mounts", mount.name), mount.frame, ends)
             for name, axis, k, c in zip("xyz", np.eye(3), mount.stiffness, mount.damping, strict=True):
-                yield SpringDamper(f"{mount.name}.{name}", *ends, at, at, _vector(axis), k, c, frame=frame)
+                yield SpringDamper(f"{mount.name}.{name}", *ends, at, at, _vector_of_numbers(axis), k, c, frame=frame)
 
     def _seat_spring(self, seat_table: SeatTable) -> SpringDamper:
         """Spring of a seat, with the occupant as first and the carrier as second body, so that force is positive in
         compression."""
         carrier = self._body(_key_path("seats", seat_table.name, "body"), seat_table.body)
-        at = _vector(seat_table.position)
+        at = _vector_of_numbers(seat_table.position)
         law, frame = (seat_table.stiffness, seat_table.damping), self._towed_under(carrier)
         return SpringDamper(seat_table.name, seat_table.name, carrier, at, at, (0.0, 0.0, 1.0), *law, frame=frame)
 
@@ -401,10 +401,10 @@ class _Builder:
         axis = self._unit(f"{place}.direction", output_table.direction)
         if kind.startswith("ang"):
             return TurnOutput(output_table.name, kind, name, axis)  # type: ignore[arg-type]
-        point = self.bodies[name].position if output_table.point is None else _vector(output_table.point)
+        point = self.bodies[name].position if output_table.point is None else _vector_of_numbers(output_table.point)
         return PointOutput(output_table.name, kind, name, point, axis)  # type: ignore[arg-type]
 
 
-def _vector(components: Any) -> Vector:
+def _vector_of_numbers(components: Any) -> Vector:
     x, y, z = map(float, components)
     return x, y, z

@@ -17,13 +17,13 @@ from mujoco import rollout
 from models.contact.fastsim_many import forces_within
 from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, Workspace, cells_in, strips_in
 from models.engines.mujoco_callback import kernel_law
-from models.engines.mujoco_quiet import installed
+from models.engines.mujoco_quiet import installed_callback
 from models.engines.mujoco_tree import principal_inertias
 from models.machine.compiled import lean
 from models.machine.records import records, size_of, stacked
 from models.machine.stack import array, beyond, doubles, row
 from models.multibody.numbers import Handling
-from models.multibody.tree import cross, dot, plus, three, times
+from models.multibody.tree import cross, dot, plus, three_from, times
 from models.tyre.bristles import SECOND_ORDER_MARCH, THREE_BRISTLES, cornering_stiffness_factor, net
 from models.vehicles.free_vehicle import ROTOR_MASS
 
@@ -82,7 +82,7 @@ def add_car_forces(table, t, q, v, forces_out):
         forces_out[k + 1] += dot(z, force)
         forces_out[k + 2] -= radius * creep.fx
         moment = plus(
-            moment, plus(cross(three(wheel_position, 0), force), (radius * creep.fy, -radius * creep.fx, creep.mz))
+            moment, plus(cross(three_from(wheel_position, 0), force), (radius * creep.fy, -radius * creep.fx, creep.mz))
         )
         force_along, across, lift = (
             force_along + creep.fx,
@@ -131,7 +131,7 @@ def _wheel_forces(wheel, frame, speeds, q, v, i, wheel_records):
     )
     force_along, force_up = -strut * wheel[3] - bush * wheel[4], bush * wheel[3] - strut * wheel[4]
     wheel_position[0], wheel_position[1], wheel_position[2] = plus(arm, displacement)
-    u, radius = plus(sliding, cross(turning, three(wheel_position, 0))), q[3] + wheel_position[2]
+    u, radius = plus(sliding, cross(turning, three_from(wheel_position, 0))), q[3] + wheel_position[2]
     load, tread = max(wheel[11] - wheel[12] * (radius - wheel[13]), 0.0), radius * v[k + 2]
     push[0], push[1], push[2] = force_along, 0.0, force_up + load
     contact[0], contact[1], contact[2], contact[3] = math.sqrt(wheel[14] * load / wheel[12]), wheel[15], load, wheel[17]
@@ -311,7 +311,7 @@ def run(handling: Handling, q: np.ndarray, v: np.ndarray, step: float, step_coun
     data, state, callback = mujoco.MjData(built), np.concatenate(([0.0], q, v)), kernel_law(add_car_forces)
 
     def run_car() -> np.ndarray:
-        with installed(callback):
+        with installed_callback(callback):
             path, _ = rollout.rollout(built, data, state[None, :], nstep=step_count)
         return np.vstack([state[1:], path[0, :, 1 : 1 + 2 * COORDINATE_COUNT]])
 

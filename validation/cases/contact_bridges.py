@@ -16,12 +16,12 @@ from models.contact.hertz import by_approach
 from models.contact.inputs import Array
 from models.contact.patches import separate
 from models.contact.simplified_theory import press, roll
-from models.engines.contact_bridge import FREEDOM, FREEDOMS, Theory, Wheels, add_forces, forces
-from models.engines.contact_bridge_exudyn import ROUTES, Forces, Rolling
-from models.engines.contact_bridge_mujoco import empty_law, model, python_law
+from models.engines.contact_bridge import FREEDOM, FREEDOMS, RailWheels, Theory, add_forces, forces
+from models.engines.contact_bridge_exudyn import ROUTES, RailWheelSystem, WheelForceFunctions
+from models.engines.contact_bridge_mujoco import empty_law, python_law, rail_wheel_model
 from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_march import Marcher
-from models.engines.mujoco_quiet import installed
+from models.engines.mujoco_quiet import installed_callback
 from models.machine.compiled import njit
 from models.machine.stack import start
 from models.machine.timing import interleave, median, spelled
@@ -88,10 +88,10 @@ class Setup:
         """The same set-up without contact."""
         return replace(self, bridge="none", law=None)
 
-    def wheels(self) -> Wheels:
+    def wheels(self) -> RailWheels:
         """The wheels that this set-up simulates."""
         theory, cells = self.law or ("none", 21)
-        return Wheels(self.wheel_count, cast(Theory, theory), cells or 21)
+        return RailWheels(self.wheel_count, cast(Theory, theory), cells or 21)
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -206,8 +206,8 @@ def _timed_march(setup: Setup) -> tuple[Callable[[int], Any], int]:
     return march, max(2, STEP_COUNTS[kind] // CALLS_PER_STEP[setup.method])
 
 
-def _mujoco_march(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
-    start, march = np.concatenate(wheels.state())[None], Marcher(model(wheels, STEP, setup.method))
+def _mujoco_march(setup: Setup, wheels: RailWheels, law: Any) -> Callable[[int], Any]:
+    start, march = np.concatenate(wheels.state())[None], Marcher(rail_wheel_model(wheels, STEP, setup.method))
     callback = {
         "none": lambda: None,
         "empty": lambda: empty_law().ctypes,
@@ -226,17 +226,17 @@ def _mujoco_march(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any
     return job
 
 
-def _exudyn_march(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
+def _exudyn_march(setup: Setup, wheels: RailWheels, law: Any) -> Callable[[int], Any]:
     zeros, of = [0.0] * wheels.size, None
     if setup.bridge == "empty":
         of = lambda q, v: zeros  # noqa: E731
     elif setup.bridge != "none":
-        of = Forces(wheels, law).of
-    rolling, state = Rolling(wheels, of, setup.bridge if setup.bridge in ROUTES else ROUTES[0]), wheels.state()
+        of = WheelForceFunctions(wheels, law).of
+    rolling, state = RailWheelSystem(wheels, of, setup.bridge if setup.bridge in ROUTES else ROUTES[0]), wheels.state()
     return lambda steps: rolling.run(*state, steps, STEP, setup.method)
 
 
-def library_law(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
+def library_law(wheels: RailWheels) -> Callable[[Array, Array, Array, Array], None]:
     """Contact law that calls the library's Python functions: FASTSIM, or the simplified theory of 1983."""
     bodies = separate(wheels.bodies) if wheels.theory == "simplified" else None
 
@@ -281,9 +281,12 @@ def _cost_rows(measured_times: MeasuredTimes) -> list[Row]:
 
 def _threads_row() -> Row:
     """Row: runs from ten initial states give the same bits in two threads as in one."""
-    wheels = Wheels()
-    states, built = np.array([np.concatenate(wheels.state(seed)) for seed in range(10)]), model(wheels, 1e-4, "RK4")
-    with installed(kernel_law(forces)):
+    wheels = RailWheels()
+    states, built = (
+        np.array([np.concatenate(wheels.state(seed)) for seed in range(10)]),
+        rail_wheel_model(wheels, 1e-4, "RK4"),
+    )
+    with installed_callback(kernel_law(forces)):
         first, two = (Marcher(built, threads).run(states, 100) for threads in (1, 2))
     same = "identical" if np.isfinite(first).all() and first.tobytes() == two.tobytes() else "different"
     return behaviour_row(
@@ -298,11 +301,11 @@ def _threads_row() -> Row:
 
 def _agreement_row() -> Row:
     """Row: difference of the states in Exudyn and MuJoCo after 0.1 s, by Runge-Kutta's method."""
-    wheels, steps = Wheels(), 1000
+    wheels, steps = RailWheels(), 1000
     q, v = wheels.state()
-    with installed(kernel_law(forces)):
-        path = Marcher(model(wheels, 1e-4, "RK4")).run(np.concatenate((q, v))[None], steps)[0]
-    by_engine = Rolling(wheels, Forces(wheels).of).run(q, v, steps, 1e-4, "RK44")
+    with installed_callback(kernel_law(forces)):
+        path = Marcher(rail_wheel_model(wheels, 1e-4, "RK4")).run(np.concatenate((q, v))[None], steps)[0]
+    by_engine = RailWheelSystem(wheels, WheelForceFunctions(wheels).of).run(q, v, steps, 1e-4, "RK44")
     size = wheels.size
     scale = np.repeat([np.abs(path[:, :size]).max(), np.abs(path[:, size:]).max()], size)
     return Observed(

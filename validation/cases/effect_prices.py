@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from models.engines.protocol import build, guard
+from models.engines.protocol import build, check_trajectory
 from models.machine.timing import describe, interleave, paired_ratio
 from models.systems.pitch_plane.run import output_channels
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
@@ -104,7 +104,7 @@ def _ratio_to_hand_built(engine: str, folder: Path, step_count: int, round_count
     bare = scene({}, step_count, folder)
     ours, theirs, times = model(bare, engine), hand_built(engine, bare), STEP * np.arange(step_count + 1)
     gap = float(np.abs(ours.run().states - theirs()).max())
-    jobs = [ours.run, lambda: guard(engine, times, theirs(), bare.run.duration), theirs]
+    jobs = [ours.run, lambda: check_trajectory(engine, times, theirs(), bare.run.duration), theirs]
     seconds = interleave(jobs, round_count, round_interval=(1, 1, UNCHECKED_INTERVAL), clock=time.process_time)
     return {
         "ratio": paired_ratio(seconds[0], seconds[1]),

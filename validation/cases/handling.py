@@ -12,11 +12,11 @@ import numpy as np
 from models.contact.fastsim_many import LOAD, MU, A, B
 from models.engines.free_vehicle_mujoco import FreeMujoco
 from models.engines.mujoco_march import Marcher
-from models.engines.mujoco_quiet import installed
+from models.engines.mujoco_quiet import installed_callback
 from models.machine.compiled import njit
 from models.machine.timing import interleave, median
 from models.multibody import forces as at
-from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
+from models.multibody.numbers import GRAVITY, Controls, Handling, TyreParameters
 from models.road.plane_waves import plane_waves
 from models.systems.handling.energy import drive_energy, unaccounted_energy
 from models.systems.handling.run import Drive, drive_run, driven_by
@@ -142,7 +142,7 @@ def mirror_difference(handling: Handling, duration: float) -> float:
 
 
 def _mirror_row(duration: float) -> Row:
-    inclined = Handling(R19, Tyres(inclination=-0.02))
+    inclined = Handling(R19, TyreParameters(inclination=-0.02))
     return Observed(
         "handling.mirror",
         SYSTEM,
@@ -181,7 +181,7 @@ def _steady_turn_rows() -> list[Row]:
 
 def _locked_stop_rows() -> list[Row]:
     mu, speed = 0.7, 15.0
-    handling = Handling(R19_WITHOUT_DRAG, Tyres(friction=mu, fixed=WHEELS))
+    handling = Handling(R19_WITHOUT_DRAG, TyreParameters(friction=mu, fixed=WHEELS))
     drive = drive_run("mujoco", handling, speed, 2.0)
     ahead = drive.velocity()[:, 0]
     left = drive["fx"] + drive.grip()
@@ -232,7 +232,7 @@ def _load_transfer_rows() -> list[Row]:
 
 
 def _slope_standstill_row() -> Row:
-    handling = Handling(R19, Tyres(fixed=WHEELS), slope=SLOPE)
+    handling = Handling(R19, TyreParameters(fixed=WHEELS), slope=SLOPE)
     drive = drive_run("mujoco", handling, 0.0, 2.0, 1e-4)
     last = slice(-2000, None)
     drift = float(np.abs(drive["slip_x"][last].mean(axis=0)).max())
@@ -246,7 +246,7 @@ def _energy_rows() -> list[Row]:
     for name, friction, controls in (("held", 20.0, SMALL_LANE_CHANGE), ("sliding", 0.9, LANE_CHANGE)):
         for step in (1e-3, 5e-4):
             drive = drive_run(
-                "mujoco", lane_change(tyres=Tyres(friction=friction), controls=controls), SPEED, 1.0, step
+                "mujoco", lane_change(tyres=TyreParameters(friction=friction), controls=controls), SPEED, 1.0, step
             )
             gaps[name, step] = float(np.abs(unaccounted_energy(drive)).max())
     start_energy = drive_energy(drive)[0]
@@ -336,7 +336,7 @@ def _threads_row() -> Row:
     built = FreeMujoco(driven_by(handling))
     built.model.opt.timestep = 1e-3
     starts = np.array([np.concatenate(handling.straight(speed)) for speed in (20.0, 25.0, 30.0)])
-    with installed(built.law):
+    with installed_callback(built.law):
         serial, both = (Marcher(built.model, threads).run(starts, 50) for threads in (1, 2))
     outcome = "identical" if serial.tobytes() == both.tobytes() else f"{np.abs(serial - both).max():.1e} apart"
     return behaviour_row(
@@ -357,7 +357,7 @@ def _timed_march(handling: Handling, step_count: int) -> Callable[[], Any]:
     start, marcher = np.concatenate(handling.straight(SPEED))[None], Marcher(built.model)
 
     def job() -> None:
-        with installed(built.law):
+        with installed_callback(built.law):
             marcher.run(start, step_count)
 
     return job

@@ -10,12 +10,12 @@ from models.core.result import Result
 from models.core.signals import Sampled
 from models.core.time_series import write_time_series
 from models.engines.assembly import Assembly, Settings
-from models.engines.stability import first_order, linearised
+from models.engines.stability import first_order, linearised_matrices
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene
 from models.systems.pitch_plane.virtual_measurement import BuildFollower, follower_builder, write_measurement
 from models.systems.pitch_plane.virtual_measurement import measure as measure_road
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 from validation.common import checks
 from validation.common.checks import trajectory_gap
 from validation.common.grounds import allowing_breaches
@@ -83,7 +83,7 @@ def prescribed_run(scene: Scene, engine: str) -> Result:
 
 
 def _missing_mass_rows(
-    parameter_set_name: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, folder: Path
+    parameter_set_name: str, p: PitchPlaneParameters, measured_run: Result, build_follower: BuildFollower, folder: Path
 ) -> list[Row]:
     """Rows: if the model's chassis is 5 % too light by the mass dm, prescribing the heave takes a mean force of dm (g -
     z3'')."""
@@ -111,7 +111,7 @@ def _missing_mass_rows(
 
 
 def _shifted_centre_rows(
-    parameter_set_name: str, p: Parameters, measured_run: Result, build_follower: BuildFollower, folder: Path
+    parameter_set_name: str, p: PitchPlaneParameters, measured_run: Result, build_follower: BuildFollower, folder: Path
 ) -> list[Row]:
     """Rows: if the model's centre of mass lies ahead of the true one, prescribing the motion takes a moment, nose
     up."""
@@ -162,7 +162,7 @@ def _high_pass_row(build_follower: BuildFollower) -> Row:
     vehicle = assembly_of_scene(
         build_follower({}, {"high_pass": {"cut_off": HIGH_PASS_CUT_OFF, "damping_ratio": ratio}})
     ).vehicle
-    poles = np.linalg.eigvals(first_order(linearised(vehicle)))
+    poles = np.linalg.eigvals(first_order(linearised_matrices(vehicle)))
     wanted = corner * complex(-ratio, np.sqrt(1 - ratio**2))
     off = float(np.abs(poles - wanted).min()) / corner
     return Observed(

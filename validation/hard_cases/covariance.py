@@ -51,10 +51,10 @@ def van_loan_naive(folder: Path) -> str:
     discretisation."""
     from filterpy.common import van_loan_discretization
 
-    from models.engines.stability import first_order, linearised
+    from models.engines.stability import first_order, linearised_matrices
 
     base = _base_assembly(np.zeros((SAMPLES, 2)))
-    p, linear = base.parameters, linearised(base.vehicle)
+    p, linear = base.parameters, linearised_matrices(base.vehicle)
     pushes = np.zeros((8, 2))
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
     smallest = []

@@ -15,7 +15,7 @@ from models.measured.axle_forces import FILE_REMEDIES, AxleForces, check_axle_fo
 from models.measured.signal import Signal
 from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.parameters.asymmetric_twin import PARAMETERS as TWIN
-from models.vehicles.plausible_plane import plausible_plane
+from models.vehicles.plausible_plane import implausible_plane_values
 from validation.common.scenes import road_scene
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, OutcomeWord
 
@@ -81,7 +81,7 @@ def _missed_doubts(change: ForceChange, doubted: bool, _: str, folder: Path) -> 
 
 
 def _unqueried_vehicle(change: dict[str, float], _: str, folder: Path) -> float:
-    return float(not plausible_plane(TWIN.model_copy(update=change)))
+    return float(not implausible_plane_values(TWIN.model_copy(update=change)))
 
 
 def _case(name: str, error: Callable[[str, Path], float], expected_ending: OutcomeWord, message: str) -> Case:

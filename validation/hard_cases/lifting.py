@@ -26,7 +26,7 @@ from models.road.signal import RoadUnderWheels
 from models.systems.hub_forces.measurement import true_run, two_tracks
 from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
-from models.vehicles.cut_vehicle import cut
+from models.vehicles.cut_vehicle import cut_at_hubs
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.bounces import BouncingVehicle, bounce_energy
@@ -165,7 +165,7 @@ def dropped_car_error(engine: str, folder: Path) -> float:
 def hub_force_in_air(engine: str, folder: Path) -> float:
     """Case: hub forces on a class F road. Error: largest force (N) or moment on a hub whose wheel is in the air;
     infinite if no wheel is."""
-    car = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body")
+    car = cut_at_hubs(load_vehicle("r19_free").with_tyres(pushes_only=True), "body")
     left, right = (iso8608_road("F", seed) for seed in (1, 2))
     drive = two_tracks(car, left, right, 20.0, 1e-3, 1500)
     wrenches = true_run(engine, car, drive, "inertial", 1e-3, 1.5).wrenches

@@ -30,7 +30,7 @@ from models.systems.hub_forces.measurement import Angles, HubForces
 from models.systems.hub_forces.tilt_filter import Deviations, estimate
 from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.systems.ride.scene import build
-from models.vehicles.cut_vehicle import cut
+from models.vehicles.cut_vehicle import cut_at_hubs
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
@@ -101,7 +101,7 @@ def scaled_drift_off_error(implementation: str, folder: Path) -> float:
 def overconfident_filter_ratio(implementation: str, folder: Path) -> float:
     """Case: a tilt filter with stated deviations of 1e-12 for angles and rates, and force noise of 1 N or 8 N. Error:
     the filter's deviations divided by the stated ones."""
-    vehicle, angles = cut(load_vehicle("r19_free"), "body"), Angles(np.zeros((5000, 4)), 2e-3)
+    vehicle, angles = cut_at_hubs(load_vehicle("r19_free"), "body"), Angles(np.zeros((5000, 4)), 2e-3)
     forces = HubForces(np.zeros((5000, 6 * len(vehicle.hubs))), 2e-3, "hub")
     fits = [
         estimate(vehicle, forces, angles, Deviations(np.full(forces.samples.shape[1], noise), (1e-12, 1e-12), 10.0))

@@ -14,7 +14,7 @@ from models.core.result import Result
 from models.core.signals import SNAP_SHARE, Sampled
 from models.core.time_series import write_time_series
 from models.engines.protocol import build
-from models.engines.stability import first_order, linearised
+from models.engines.stability import first_order, linearised_matrices
 from models.road.continuation import run_in
 from models.road.polyline import PolylineProfile
 from models.road.profile import SplineProfile
@@ -170,7 +170,7 @@ def noise_adaptive_naive(folder: Path) -> str:
     base = vehicle(geometry="linear")
     forces = static_forces(base, 200, 1e-3, noise=500.0)
     driven = setups.driven_by_forces(base, forces)
-    linear = linearised(driven.vehicle)
+    linear = linearised_matrices(driven.vehicle)
     a, masses, g = first_order(linear), linear[0].diagonal(), base.parameters.g
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:

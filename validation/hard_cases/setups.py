@@ -12,7 +12,7 @@ from models.engines.assembly import Assembly, Mode, Settings
 from models.engines.catalogue import RECOMMENDED
 from models.engines.protocol import build
 from models.engines.protocol import build_unchecked as build_unchecked
-from models.engines.stability import first_order, linearised
+from models.engines.stability import first_order, linearised_matrices
 from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases.case import IMPLEMENTATIONS, OutcomeWord
@@ -111,7 +111,7 @@ def exact_states(assembly: Assembly, step: float, step_count: int, forces: np.nd
 
     forces (step_count, 2) in N are held over each step; None is the vehicle on the flat road.
     """
-    linear = linearised(assembly.vehicle)
+    linear = linearised_matrices(assembly.vehicle)
     push = np.zeros((step_count, 4))
     push[:, :3] = [body.mass * assembly.vehicle.gravity for body in assembly.vehicle.bodies]
     if forces is not None:
@@ -128,7 +128,7 @@ def exact_states(assembly: Assembly, step: float, step_count: int, forces: np.nd
 
 def exact_decay(assembly: Assembly, times: np.ndarray) -> np.ndarray:
     """Exact states (n, 8) of the linearised vehicle on a flat road, at any times (n,) in s."""
-    poles, shapes = np.linalg.eig(first_order(linearised(assembly.vehicle)))
+    poles, shapes = np.linalg.eig(first_order(linearised_matrices(assembly.vehicle)))
     rest_state = vehicle(geometry="linear").initial
     shares = np.linalg.solve(shapes, assembly.initial - rest_state)
     return rest_state + ((np.exp(np.outer(times, poles)) * shares) @ shapes.T).real

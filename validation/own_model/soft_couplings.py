@@ -9,7 +9,7 @@ bodies' means over three directions, of their centres' shifts or of their turns.
 
 import numpy as np
 
-from models.multibody.plain.constraints import turning_rows
+from models.multibody.plain.constraints import angular_velocity_jacobian
 from models.multibody.plain.motion import FIRST_DERIVATIVE
 from models.own_model.builds import Equations, Motion, plain_tree
 from models.own_model.constraints import plain_constraints
@@ -69,6 +69,8 @@ def _mean_inverse_inertia(twin: TwinModel, inverse_mass: np.ndarray, ends: tuple
     motion = bodies.move(*np.zeros((2, twin.size)))
     for name in (name for name, _ in ends if name is not None):
         (shift,) = motion.at(bodies.points([(name, bodies.position[name])]))
-        for i, rows in enumerate((shift[FIRST_DERIVATIVE:].T, turning_rows(motion.axes(bodies.row[name])))):
+        for i, rows in enumerate(
+            (shift[FIRST_DERIVATIVE:].T, angular_velocity_jacobian(motion.axes(bodies.row[name])))
+        ):
             total[i] += np.trace(rows @ inverse_mass @ rows.T) / 3.0
     return total

@@ -13,7 +13,7 @@ from models.measured.ratios import probable_mistake
 from models.measured.recording import Recording
 from models.measured.signal import Signal, TransducerPlace
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 COMPARED_BAND = 1.0, 25.0
 """Frequency band (Hz) in which forces and motion are compared: above the drift of a free vehicle, below the bending of
@@ -36,7 +36,7 @@ class Evidence:
     vehicle: CutVehicle | None
     places: Mapping[str, TransducerPlace] = field(default_factory=dict)
     stated_noise: Mapping[str, float] = field(default_factory=dict)
-    plane: Parameters | None = None
+    plane: PitchPlaneParameters | None = None
 
     @cached_property
     def forces(self) -> tuple[Signal, ...]:

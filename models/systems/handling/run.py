@@ -26,7 +26,7 @@ from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.error_control import NO_ESTIMATE
-from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
+from models.engines.free_vehicle import FreeModel, LoadedVehicle, PlainModel, free_model
 from models.engines.native_parts import joint_parts
 from models.engines.towed_springs import shared_numbers, towed_division
 from models.multibody import forces as at
@@ -36,7 +36,7 @@ from models.systems.handling.limits import check_step, check_upright
 from models.systems.handling.scene import HandlingScene
 from models.vehicles.free_vehicle import chassis_of
 from models.vehicles.spatial import JointElement
-from models.vehicles.spatial_linear import mass
+from models.vehicles.spatial_linear import design_mass_matrix
 
 if TYPE_CHECKING:
     from models.multibody.plain.rolling import PlainRolling
@@ -290,7 +290,7 @@ class ManoeuvreRerun:
             for run_array in (run.times, run.positions, run.rates)
         )
         report = np.empty((len(sampled_times), len(handling.vehicle.tyres), at.REPORTED))
-        at.reports(numbers, sampled_times, positions, rates, report, np.empty((len(sampled_times), at.LEDGER)))
+        at.fill_reports(numbers, sampled_times, positions, rates, report, np.empty((len(sampled_times), at.LEDGER)))
         return report[:, :, [at.FX, at.FY]]
 
 
@@ -325,7 +325,9 @@ def build(engine: str, handling: Handling, settings: Settings | None = None) -> 
     and duration, needed for runs only.
     """
     if engine == REFERENCE:
-        return Plain(engine, _plain_equations(handling).acceleration, len(handling.vehicle.coordinates()), settings)
+        return PlainModel(
+            engine, _plain_equations(handling).acceleration, len(handling.vehicle.coordinates()), settings
+        )
     division, full_forces = towed_division(handling, engine), driven_by(handling)
     parts = (*full_forces.parts, *division.native)
     return free_model(engine, replace(full_forces, numbers=shared_numbers(handling, division), parts=parts), settings)
@@ -337,12 +339,12 @@ def _plain_equations(handling: Handling) -> "PlainRolling":
     return PlainRolling(handling)
 
 
-def driven_by(handling: Handling) -> Driven:
+def driven_by(handling: Handling) -> LoadedVehicle:
     """Returns what an engine builds of the car: bodies, elements along joint coordinates, and all compiled forces with
     their parameters.
     """
     parts = joint_parts(handling.vehicle)
-    return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces, parts)
+    return LoadedVehicle(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces, parts)
 
 
 def drive_run(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
@@ -387,7 +389,7 @@ def drive_of_fixed_steps(handling: Handling, run: Trajectory, engine: str = "", 
     """
     drive = drive_with_reports(handling, run, engine, seconds)
     check_step(drive, engine)
-    check_resolved(engine, run.times, run.positions, run.rates, mass(handling.vehicle))
+    check_resolved(engine, run.times, run.positions, run.rates, design_mass_matrix(handling.vehicle))
     return drive
 
 
@@ -411,7 +413,7 @@ def _reports_of_run(handling: Handling, run: Trajectory, engine: str) -> tuple[n
     count, tyres = len(run.times), len(handling.vehicle.tyres)
     report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
     states = np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates)
-    at.reports(handling.numbers, run.times, *states, report, ledger)
+    at.fill_reports(handling.numbers, run.times, *states, report, ledger)
     for element in handling.vehicle.joint_elements:
         travel, rate = (joint_travel(handling, element, values) for values in states)
         ledger[:, at.POTENTIAL] += (element.preload + 0.5 * element.stiffness * travel) * travel

@@ -14,8 +14,8 @@ from models.core.scene_file import SceneFile, checked
 from models.core.steps import MOST_STEPS, divides, dividing_step
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.engines.assembly import Settings
-from models.engines.error_control import Adaptive, check_engines
-from models.multibody.numbers import Controls, Handling, Tyres
+from models.engines.error_control import AdaptiveEngineTable, check_engines
+from models.multibody.numbers import Controls, Handling, TyreParameters
 from models.own_model.scene_vehicle import scene_vehicle
 from models.road.iso8608 import level_of_class
 from models.road.plane_waves import plane_waves
@@ -120,7 +120,9 @@ class HandlingScene(SceneFile):
     run: RunTable = RunTable()
     manoeuvres: dict[str, Manoeuvre] = Field(min_length=1, description="driven one by one, a table each")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
-    engines: dict[str, Adaptive] = Field(default_factory=dict, description="engines that pick their own steps")
+    engines: dict[str, AdaptiveEngineTable] = Field(
+        default_factory=dict, description="engines that pick their own steps"
+    )
     _measured_controls: dict[str, Controls] = PrivateAttr(default_factory=dict)
     """Controls that were computed for measured drives, by manoeuvre."""
 
@@ -147,7 +149,7 @@ class HandlingScene(SceneFile):
         waves = (
             plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if manoeuvre.rough else np.empty((0, 4))
         )
-        tyres = Tyres(**self.tyres.model_dump(exclude={"cornering"}))
+        tyres = TyreParameters(**self.tyres.model_dump(exclude={"cornering"}))
         return extended_by_effects(
             Handling(self.file_vehicle(), tyres, manoeuvre.controls(), waves, forces=self.run.forces), self
         )

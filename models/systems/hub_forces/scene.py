@@ -19,10 +19,10 @@ from models.core.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
 from models.core.time_series import CHASSIS_SAMPLE_TIME, read_time_series, wrong_time_unit_hint
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import FIXED_STEP_METHOD, ForceRoute
-from models.engines.error_control import Adaptive, check_engines
+from models.engines.error_control import AdaptiveEngineTable, check_engines
 from models.own_model.scene_vehicle import scene_vehicle
 from models.systems.hub_forces.measurement import Angles, HubForces
-from models.vehicles.cut_vehicle import CutVehicle, cut
+from models.vehicles.cut_vehicle import CutVehicle, cut_at_hubs
 
 Frame = Literal["hub", "body", "inertial"]
 Noise = Literal["white", "none"]
@@ -132,7 +132,9 @@ class HubScene(SceneFile):
     stabilise: Stabiliser = Stabiliser()
     seed: int = Field(default=1, ge=0, le=2**62, description="of the noise")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
-    engines: dict[str, Adaptive] = Field(default_factory=dict, description="engines that pick their own steps")
+    engines: dict[str, AdaptiveEngineTable] = Field(
+        default_factory=dict, description="engines that pick their own steps"
+    )
 
     @property
     def step_count(self) -> int:
@@ -155,7 +157,7 @@ class HubScene(SceneFile):
     def cut_vehicle(self) -> CutVehicle:
         """Returns the vehicle without its tyres, cut at the hubs, with the scene's effects; raises InputError."""
         vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
-        return cut(extended_by_effects(vehicle, self), self.vehicle.chassis)
+        return cut_at_hubs(extended_by_effects(vehicle, self), self.vehicle.chassis)
 
     def deviations(self, vehicle: CutVehicle) -> np.ndarray:
         """Standard deviations (6 h,) of the noise of each hub force (N) and moment (N m), hub by hub."""

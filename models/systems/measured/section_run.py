@@ -24,7 +24,7 @@ from models.engines.protocol import SIZE_BOUND
 from models.machine.compiled import checksum
 from models.measured.columns import Columns
 from models.measured.recording import Recording, no_progress
-from models.multibody.cut_table import HubInputs, table
+from models.multibody.cut_table import HubInputs, cut_vehicle_table
 from models.systems.measured.inputs import Inputs, PrescribedAngles, StepGrid
 from models.systems.measured.sections import SectionChannel, Sections
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, rigid_vehicle
@@ -341,7 +341,7 @@ def _inputs_of(job: SectionRun, inputs: Inputs) -> dict[str, str]:
     for signal in inputs.used_signals:
         samples = digest_of(samples, signal, job.recording.samples(signal))
     return {
-        "vehicle": digest_of(table(job.vehicle, idle, job.grid.step), job.vehicle.tree.coordinates()),
+        "vehicle": digest_of(cut_vehicle_table(job.vehicle, idle, job.grid.step), job.vehicle.tree.coordinates()),
         "recording": samples,
         "stabiliser": repr(job.hold),
         "engine": f"{job.engine} {version(library)}",

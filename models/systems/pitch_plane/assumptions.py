@@ -10,7 +10,7 @@ from models.core.assumptions import Assumption, Watched
 from models.core.errors import InputError
 from models.core.result import Result
 from models.engines.assembly import Assembly
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 SMALL_PITCH = 0.3
 """Largest pitch (rad) with linear geometry: it differs from its sine by 1.5 %."""
@@ -81,7 +81,7 @@ def _tyre_assumptions(assembly: Assembly, lifts: bool) -> list[Assumption]:
     return [Assumption("tyres press", says, remedy, forces, "N", lower_limit=-PULL_LIMIT), pressed]
 
 
-def _deflections(parameters: Parameters, run: Result) -> Watched:
+def _deflections(parameters: PitchPlaneParameters, run: Result) -> Watched:
     """Static deflection (n,) in m of each tyre under the wheel's force, by tyre."""
     return {"front tyre": run["f1"] / parameters.k1, "rear tyre": run["f2"] / parameters.k2}
 
@@ -103,7 +103,7 @@ def _spring_assumption(assembly: Assembly, lifts: bool) -> Assumption:
     )
 
 
-def _compressions(parameters: Parameters, exact: bool, run: Result) -> Watched:
+def _compressions(parameters: PitchPlaneParameters, exact: bool, run: Result) -> Watched:
     """Compression (n,) in m of each suspension spring from the motion of chassis and wheels, by axle."""
     sine_of_pitch = np.sin(run["pitch"]) if exact else run["pitch"]
     return {
@@ -143,7 +143,7 @@ def _artificial_force_assumption(assembly: Assembly) -> Assumption:
     )
 
 
-def _artificial_shares(parameters: Parameters, heave: bool, run: Result) -> Watched:
+def _artificial_shares(parameters: PitchPlaneParameters, heave: bool, run: Result) -> Watched:
     """Rms of the artificial moment, and of the artificial force where heave is prescribed, divided by the chassis'
     inertia term, up to 15 Hz. Empty where the rows are too few or too far apart.
     """

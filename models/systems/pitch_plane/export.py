@@ -3,7 +3,7 @@ road, wheel forces or prescribed motion.
 """
 
 from models.engines.assembly import Assembly, Settings
-from models.engines.export import Exported, ExportSubject, exported_exudyn_system, exported_mujoco_model
+from models.engines.export import ExportedModel, ExportSubject, exported_exudyn_system, exported_mujoco_model
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 
 AXES = {
@@ -21,7 +21,7 @@ INPUTS_OF_MODE = {
 """Inputs of the vehicle that an export leaves out, by the mode of excitation."""
 
 
-def exported(scene: Scene, engine: str) -> Exported:
+def exported(scene: Scene, engine: str) -> ExportedModel:
     """Export the pitch-plane vehicle as a model file of "mujoco" or "exudyn"."""
     assembly, subject = assembly_of_scene(scene), ExportSubject(scene.title, scene.file, AXES[engine])
     left_out = _left_out(assembly)
@@ -47,7 +47,9 @@ def _left_out(assembly: Assembly) -> list[str]:
     ]
 
 
-def _in_mujoco(assembly: Assembly, settings: Settings, export_subject: ExportSubject, omissions: list[str]) -> Exported:
+def _in_mujoco(
+    assembly: Assembly, settings: Settings, export_subject: ExportSubject, omissions: list[str]
+) -> ExportedModel:
     from models.engines.mujoco import specification
     from models.engines.mujoco_export import add_shapes
 
@@ -56,7 +58,7 @@ def _in_mujoco(assembly: Assembly, settings: Settings, export_subject: ExportSub
     return exported_mujoco_model(spec, spec.compile(), {}, export_subject, omissions)
 
 
-def _in_exudyn(assembly: Assembly, export_subject: ExportSubject, omissions: list[str]) -> Exported:
+def _in_exudyn(assembly: Assembly, export_subject: ExportSubject, omissions: list[str]) -> ExportedModel:
     from models.engines.exudyn import coordinate_indices, native_elements
 
     built, vehicle = native_elements(assembly), assembly.vehicle

@@ -24,7 +24,7 @@ from models.core.systems import DEFAULT_SYSTEM
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import build, guard
+from models.engines.protocol import build, check_trajectory
 from models.ensemble.runner import PathFailed
 from models.ensemble.store import Arrays
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, effects_in_order, settings_of
@@ -187,7 +187,7 @@ class MujocoThreads(NoisePaths):
             return
         for states in marched:
             try:
-                guard("mujoco", step_times, states, self.settings.duration)
+                check_trajectory("mujoco", step_times, states, self.settings.duration)
                 yield Trajectory(step_times, states)
             except RunFailed as error:
                 yield error
@@ -197,13 +197,13 @@ class MujocoThreads(NoisePaths):
         from mujoco import rollout
 
         from models.engines.mujoco_march import warning_text
-        from models.engines.mujoco_quiet import installed, without_warnings
+        from models.engines.mujoco_quiet import installed_callback, without_warnings
 
         start = np.concatenate(([0.0], self.base.initial))
         has_controls = models[0].drive.controls is not None
         controls = np.stack([model.controls() for model in models]) if has_controls else None
         working = models[: self.threads]
-        with installed(models[0].drive.law), without_warnings():
+        with installed_callback(models[0].drive.law), without_warnings():
             sensed, _ = rollout.rollout(
                 [model.model for model in models],
                 [model.data for model in working],

@@ -13,7 +13,7 @@ from models.engines.protocol import check_assembly as check_engine
 from models.systems.pitch_plane.assumptions import assumptions
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 from models.vehicles.pitch_plane import STATE_NAMES
-from models.vehicles.plausible_plane import plausible_plane
+from models.vehicles.plausible_plane import implausible_plane_values
 
 MODE_TEXTS = {
     "free": "free motion on the flat road",
@@ -40,7 +40,7 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
 def findings(scene: Scene) -> tuple[Finding, ...]:
     """Returns doubts about implausible parameters of the vehicle, and about wheel forces and prescribed motions."""
     doubts = (Finding("input", "doubt", scene.file, text) for text in assembly_of_scene(scene).doubts)
-    return (*plausible_plane(scene.vehicle_parameters(), scene.vehicle.accept), *doubts)
+    return (*implausible_plane_values(scene.vehicle_parameters(), scene.vehicle.accept), *doubts)
 
 
 def describe(scene: Scene) -> str:

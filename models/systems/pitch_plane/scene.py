@@ -68,13 +68,13 @@ class Scene(SceneFile):
     effects: dict[str, Any] = Field(default_factory=dict, description="the effects of the scene, a table each")
     engines: dict[str, EngineTable] = Field(default_factory=dict)
 
-    def vehicle_parameters(self) -> pitch_plane.Parameters:
+    def vehicle_parameters(self) -> pitch_plane.PitchPlaneParameters:
         """Returns the vehicle's parameters with the scene's overrides. An InputError names the file
         of the wrong value.
         """
         base = parameter_set(self.vehicle.parameters, self.file, Path(self.folder))
         values = {**base.model_dump(), **self.vehicle.override}
-        p = read(pitch_plane.Parameters, values, self.file, "vehicle.override")
+        p = read(pitch_plane.PitchPlaneParameters, values, self.file, "vehicle.override")
         _check_rest(p, self)
         return p
 
@@ -94,10 +94,12 @@ class Scene(SceneFile):
         return named.model_copy(update={"integrator": named.integrator or usual, "step": named.step or self.run.step})
 
 
-def parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
+def parameter_set(name: str, file: str, folder: Path) -> pitch_plane.PitchPlaneParameters:
     """A published parameter set by its name, or the user's own from a TOML file."""
     if name.endswith(".toml"):
-        return read(pitch_plane.Parameters, parse(existing_file(name, folder, file, "vehicle.parameters")), name)
+        return read(
+            pitch_plane.PitchPlaneParameters, parse(existing_file(name, folder, file, "vehicle.parameters")), name
+        )
     if name not in parameter_sets():
         allowed = "must be a TOML file with all parameters, or a published set"
         raise InputError(file, "vehicle.parameters", name, allowed, parameter_sets())
@@ -108,7 +110,7 @@ SMALLEST_PARAMETER = 1e-9
 """Smallest positive value of a vehicle's parameter in SI units."""
 
 
-def _check_rest(parameters: pitch_plane.Parameters, scene: Scene) -> None:
+def _check_rest(parameters: pitch_plane.PitchPlaneParameters, scene: Scene) -> None:
     """Raise InputError for parameters without a static equilibrium, in which every run begins, and for tiny
     parameters.
     """
@@ -219,14 +221,14 @@ def assembly_of_scene(scene: Scene) -> Assembly:
     effects are imported.
     """
     p = scene.vehicle_parameters()
-    vehicle = pitch_plane.describe(p, scene.vehicle.geometry)
+    vehicle = pitch_plane.pitch_plane_vehicle(p, scene.vehicle.geometry)
     assembly = Assembly(scene, vehicle, p, "free", None, _initial_state(scene, p))
     for name in effects_in_order(scene):
         assembly = module_of(DEFAULT_SYSTEM, name).extend(assembly, scene.effects[name])
     return assembly
 
 
-def _initial_state(scene: Scene, parameters: pitch_plane.Parameters) -> np.ndarray:
+def _initial_state(scene: Scene, parameters: pitch_plane.PitchPlaneParameters) -> np.ndarray:
     """Initial state (8,) of a scene: the static equilibrium, except for the states in [start]."""
     state = pitch_plane.equilibrium(parameters, scene.vehicle.geometry)
     for name, value in scene.start.items():

@@ -24,7 +24,7 @@ from models.core.signals import Sampled, Smooth
 from models.engines.assembly import Assembly
 from models.engines.reference import compiled_closure
 from models.machine.compiled import named_closure
-from models.vehicles.pitch_plane import STATES, Parameters
+from models.vehicles.pitch_plane import STATES, PitchPlaneParameters
 from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, suspension_forces
 
 LONGEST_STEP = 1e-3
@@ -177,7 +177,10 @@ class TangentPath:
         return march_along(compile_march, self.assembly.mode, self.assembly.vehicle.geometry)
 
     def propagate_errors(
-        self, columns: np.ndarray, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
+        self,
+        columns: np.ndarray,
+        errors: np.ndarray | None = None,
+        wrong_parameters: PitchPlaneParameters | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Propagate errors along the path. Returns states (n + 1, 8) and error columns (n + 1, m, 8) at all steps; the
         columns begin with ``columns`` (m, 8).

@@ -26,7 +26,7 @@ from models.drift.growth import (
 )
 from models.engines.assembly import Assembly
 from models.systems.pitch_plane.tangent import LONGEST_STEP, TangentPath, path_of
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 if TYPE_CHECKING:
     from models.measured.axle_forces import AxleForces
@@ -136,7 +136,7 @@ def interpolation_error_curve(assembly: Assembly, longest_step: float = LONGEST_
 
 
 def model_error_curve(
-    assembly: Assembly, wrong_parameters: Parameters, longest_step: float = LONGEST_STEP
+    assembly: Assembly, wrong_parameters: PitchPlaneParameters, longest_step: float = LONGEST_STEP
 ) -> GrowthCurve:
     """Pitch error over time of a run with ``wrong_parameters`` instead of the assembly's parameters.
 
@@ -146,13 +146,13 @@ def model_error_curve(
     """
     parameters = assembly.parameters.model_dump()
     change = {name: getattr(wrong_parameters, name) - value for name, value in parameters.items()}
-    mean = Parameters(**{name: value + 0.5 * change[name] for name, value in parameters.items()})
-    shifted = Parameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
+    mean = PitchPlaneParameters(**{name: value + 0.5 * change[name] for name, value in parameters.items()})
+    shifted = PitchPlaneParameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
     return _growth_by_parameters(path_of(replace(assembly, parameters=mean), longest_step), wrong_parameters=shifted)
 
 
 def _growth_by_parameters(
-    path: TangentPath, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
+    path: TangentPath, errors: np.ndarray | None = None, wrong_parameters: PitchPlaneParameters | None = None
 ) -> GrowthCurve:
     pushes = None if errors is None else errors[:, None, :]
     _, columns = path.propagate_errors(np.zeros((1, 8)), pushes, wrong_parameters)

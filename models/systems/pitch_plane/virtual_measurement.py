@@ -15,7 +15,7 @@ from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, build
-from models.vehicles.pitch_plane import STATE_NAMES, Parameters
+from models.vehicles.pitch_plane import STATE_NAMES, PitchPlaneParameters
 
 PAPER_FACTORS = {"k3": 1.05, "k4": 0.95, "d3": 0.95, "d4": 1.05, "I": 0.95}
 """Perturbed model of the paper's Appendix B, as factors on the vehicle's parameters."""
@@ -34,7 +34,9 @@ BuildFollower = Callable[[Mapping[str, float], Mapping[str, Any]], Scene]
 """Function that builds a force-excited scene from overrides of vehicle parameters and further effects."""
 
 
-def perturbed_parameters(parameters: Parameters, factors: Mapping[str, float] = PAPER_FACTORS) -> dict[str, float]:
+def perturbed_parameters(
+    parameters: PitchPlaneParameters, factors: Mapping[str, float] = PAPER_FACTORS
+) -> dict[str, float]:
     """Returns the changed parameters by name: each is the value in ``parameters`` times its factor."""
     return {name: getattr(parameters, name) * factor for name, factor in factors.items()}
 

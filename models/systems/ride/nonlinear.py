@@ -34,9 +34,9 @@ from models.systems.ride.errors_in_time import with_error_of_copies
 from models.systems.ride.of_scene import excitation_of, linear_vehicle
 from models.systems.ride.scene import RideScene
 from models.systems.ride.watched import MotionInRun, Spectral, checked_speeds, watched_vehicle
-from models.vehicles.linear_vehicle import Output
+from models.vehicles.linear_vehicle import LinearOutput
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import linearise, preloads, wheels
+from models.vehicles.spatial_linear import linearise, static_preloads, wheels
 
 LONGEST_STEP = 2e-3
 """Longest time step (s) of runs in engines; stiff springs need a shorter step."""
@@ -412,12 +412,12 @@ def _outputs_at_steps(
                     output, rate_factors=0.0 * output.rate_factors, road_rate_factors=0.0 * output.road_rate_factors
                 )
             )
-            load = preloads(vehicle).tyres[spec.tyre]
+            load = static_preloads(vehicle).tyres[spec.tyre]
             values[:] = np.maximum(np.minimum(load + values, 2.0 * (load + elastic)), 0.0) - load
     return Ride(linear.names, run, step_numbers * road.step - step_numbers[0] * road.step, outputs, step_numbers)
 
 
-def factors_of_output(output: Output) -> np.ndarray:
+def factors_of_output(output: LinearOutput) -> np.ndarray:
     """Returns the factors (3 n + 2 w,) of an output: of accelerations, rates, positions, road heights and their rates,
     in this order.
     """

@@ -14,9 +14,9 @@ from models.ride.sweep import variance_sweep
 from models.road.excitation import Excitation
 from models.systems.ride.of_scene import GRAVITY, LinearVehicleAtSpeed
 from models.vehicles.kinematics import Kinematics
-from models.vehicles.linear_vehicle import LinearVehicle, Output
+from models.vehicles.linear_vehicle import LinearOutput, LinearVehicle
 from models.vehicles.spatial import PartOutput, PointOutput, SpatialOutput, SpatialVehicle, TurnOutput, TyreOutput
-from models.vehicles.spatial_linear import linearise, outputs, preloads
+from models.vehicles.spatial_linear import linear_outputs, linearise, static_preloads
 
 AXES = {"rx": (1.0, 0.0, 0.0), "ry": (0.0, 1.0, 0.0), "rz": (0.0, 0.0, 1.0)}
 """Axis of each rotational degree of freedom."""
@@ -57,11 +57,11 @@ def watched_vehicle(linear: LinearVehicle, vehicle: SpatialVehicle, speed: float
     speed (m/s).
     """
     watched = replace(vehicle, outputs=watched_outputs(vehicle))
-    rows = linearise(watched, speed).outputs if vehicle.limits else outputs(watched, Kinematics(watched))
+    rows = linearise(watched, speed).outputs if vehicle.limits else linear_outputs(watched, Kinematics(watched))
     return replace(linear, outputs=(*rows, *_slip_outputs(vehicle, rows, speed)))
 
 
-def _slip_outputs(vehicle: SpatialVehicle, rows: tuple[Output, ...], speed: float) -> Iterator[Output]:
+def _slip_outputs(vehicle: SpatialVehicle, rows: tuple[LinearOutput, ...], speed: float) -> Iterator[LinearOutput]:
     named = {row.name: row for row in rows}
     for force in vehicle.side_forces:
         side, roll, yaw = (named[f"{quantity_name} {force.name}"] for quantity_name in ("side velocity", "roll", "yaw"))
@@ -74,7 +74,7 @@ def _slip_outputs(vehicle: SpatialVehicle, rows: tuple[Output, ...], speed: floa
 def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
     """Static load (N) of every tyre by name; empty where the springs carry no weight."""
     with suppress(InputError):
-        return preloads(replace(vehicle, gravity=GRAVITY)).tyres
+        return static_preloads(replace(vehicle, gravity=GRAVITY)).tyres
     return {}
 
 
