@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from models.core.errors import InputError
-from models.machine.seconds import duration
+from models.machine.seconds import duration_text
 from models.systems import run as run_scene
 from models.systems.contact.run import BLOCKS_FOLDER
 from models.systems.contact.scene import ContactScene
@@ -50,11 +50,11 @@ def summary_lines(row_count: int, wrong_row_count: int, name: str, seconds: floa
         return [f"  no rows in {name}"]
     sound = ", all of them sound" if row_count > 1 else ", sound"
     state = f"; {wrong_row_count:,} of them wrong, see their status" if wrong_row_count else sound
-    row_time_text = f", {duration(seconds / row_count)} a row" if row_count > 1 else ""
+    row_time_text = f", {duration_text(seconds / row_count)} a row" if row_count > 1 else ""
     twice = " twice for the error of cells" if errors else ""
     return [
         f"  {row_count:,} row{'s' * (row_count > 1)} of {name}{state}",
-        f"  {duration(seconds)}{row_time_text}, once: reading, forces{twice}, writing",
+        f"  {duration_text(seconds)}{row_time_text}, once: reading, forces{twice}, writing",
     ]
 
 

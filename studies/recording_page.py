@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from models.core.assumptions import assumption_sentences, broken_of
+from models.core.assumptions import assumption_sentences, broken_assumptions_of
 from models.core.discretisation import error_lines
 from models.core.result import Result
 from models.core.whole_files import write_whole
@@ -52,7 +52,7 @@ def page_text(examination: Examination, folder: Path, result: Result) -> str:
         exam=examination,
         names=RUN_NAMES,
         errors=error_lines(result),
-        breaches=[breach.line() for breach in broken_of(result)],
+        breaches=[breach.line() for breach in broken_assumptions_of(result)],
         assumed=assumption_sentences(result),
         free=FREE_RUN,
         weights=[finding.weight for finding in examination.findings],

@@ -119,11 +119,11 @@ def test_machine_code_is_as_old_as_the_kernels_that_its_file_imports_from_other_
     monkeypatch.setattr(compiled, "ROOT", tmp_path)
     found = {}
     for changed in ("a/mine.py", "b/theirs.py", "c/deep.py", "c/other.py"):
-        before = compiled.stamp(tmp_path / "models" / "a" / "mine.py")
+        before = compiled.source_checksum(tmp_path / "models" / "a" / "mine.py")
         path = tmp_path / "models" / changed
         path.write_text(path.read_text() + "# changed\n")
-        compiled.checksum.cache_clear()
-        found[changed] = compiled.stamp(tmp_path / "models" / "a" / "mine.py") != before
+        compiled.folder_checksum.cache_clear()
+        found[changed] = compiled.source_checksum(tmp_path / "models" / "a" / "mine.py") != before
     assert found == {"a/mine.py": True, "b/theirs.py": True, "c/deep.py": True, "c/other.py": False}
 
 
@@ -131,7 +131,7 @@ def test_a_kernel_that_is_given_another_one_is_as_old_as_that():
     from models.brake.sprung_step import compiled as stepping
     from models.engines.mujoco_native import accelerate, march
 
-    files = compiled._files(stepping("in_a_test", accelerate=accelerate, march=march).py_func)
+    files = compiled._compiled_source_files(stepping("in_a_test", accelerate=accelerate, march=march).py_func)
     assert {file.name for file in files} >= {"sprung_step.py", "plane_step.py", "mujoco_native.py"}
 
 

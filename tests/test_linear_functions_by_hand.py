@@ -10,7 +10,7 @@ import pytest
 
 from models.contact.fastsim_grid import grid
 from models.contact.linear_theory import coefficients
-from models.core.systems import of_table
+from models.core.systems import scene_of_table
 from models.engines.native_parts import AxialTravel
 from models.engines.spatial_protocol import EngineKinematics, difference_step
 from models.multibody.numbers import _last_coordinate_of_frame, _put_curves
@@ -112,7 +112,7 @@ def test_filters_of_a_road_are_its_corners_and_the_roots_of_its_intensities():
 def ride_scene(**road):
     """A scene of the shipped car."""
     table = {"title": "t", "system": "ride", "vehicle": {"file": "r19_free"}, "road": road}
-    return of_table({**table, "speeds": {"values": [20.0]}}, "s.toml", Path())
+    return scene_of_table({**table, "speeds": {"values": [20.0]}}, "s.toml", Path())
 
 
 def test_wheels_run_where_the_scene_says():
@@ -257,7 +257,7 @@ def test_a_growth_that_is_written_out_has_its_own_critical_speed():
 def wheelset_scene(**run):
     """A scene of the chosen wheelset."""
     table = {"title": "t", "system": "wheelset", "speeds": {"values": [80.0]}, "run": {"duration": 0.1, **run}}
-    return of_table(table, "s.toml", Path())
+    return scene_of_table(table, "s.toml", Path())
 
 
 def test_paths_of_a_wheelset_begin_where_their_scene_says_at_speeds_about_the_critical_one():

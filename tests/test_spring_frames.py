@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError, Refused
-from models.core.scene_file import parse
+from models.core.scene_file import parse_toml
 from models.engines.spatial_protocol import build, jacobian
 from models.engines.spatial_reference import SpatialReference
 from models.multibody.numbers import Handling
@@ -30,7 +30,7 @@ def test_every_system_names_its_frame():
 
 
 def _with_frame(frame):
-    table = parse(SHIPPED_FOLDER / "r19_free.toml")
+    table = parse_toml(SHIPPED_FOLDER / "r19_free.toml")
     table["springs"][0]["frame"] = table["mounts"][0]["frame"] = frame
     return build_vehicle(table, "car.toml")
 

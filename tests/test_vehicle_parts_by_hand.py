@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from models.core.noise import GYRO_BIAS, normal_samples
-from models.core.systems import of_table
+from models.core.systems import scene_of_table
 from models.engines.stability import first_order, log_growth
 from models.multibody.numbers import Handling, TyreParameters
 from models.sensors.inertial_unit import bias_path
@@ -131,6 +131,6 @@ def test_results_of_a_measured_drive_begin_at_the_time_of_its_file(tmp_path: Pat
     rows = "\n".join(f"{5.25 + 0.1 * k:.2f},{0.01 * k:.2f},{8.5:.2f}" for k in range(21))
     (tmp_path / "drive.csv").write_text(f"time [s],steer [rad],speed [m/s]\n{rows}\n")
     table = {"title": "t", "system": "handling", "manoeuvres": {"way": {"measured": "drive.csv"}}}
-    scene = of_table(table, "s.toml", tmp_path)
+    scene = scene_of_table(table, "s.toml", tmp_path)
     assert scene.start_time("way") == pytest.approx(5.25, rel=1e-12)
     assert (scene.manoeuvres["way"].speed, scene.manoeuvres["way"].duration) == pytest.approx((8.5, 2.0), rel=1e-9)

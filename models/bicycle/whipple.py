@@ -17,7 +17,7 @@ from numpy.polynomial import Polynomial
 from pydantic import Field, model_validator
 
 from models.core.errors import InputError
-from models.core.scene_file import existing_file, parse
+from models.core.scene_file import existing_file, parse_toml
 from models.core.strict import Strict, quantity, read
 
 PARAMETER_SET_FOLDER = Path(__file__).parents[1] / "vehicles" / "parameters" / "bicycles"
@@ -267,7 +267,7 @@ def load_bicycle(name: str, folder: str | Path = ".", file: str = "", key_path: 
             file, key_path, name, "must be a TOML file with all parameters, or a parameter set", tuple(sets)
         )
     path = sets.get(name) or existing_file(name, Path(folder), file, key_path)
-    bicycle = read(Whipple, parse(path), path.name)
+    bicycle = read(Whipple, parse_toml(path), path.name)
     try:
         bicycle.linear  # noqa: B018
     except InputError as error:

@@ -20,7 +20,7 @@ from models.brake.brake import Brakes
 from models.brake.plane_records import REPORT_SIZE, PlaneMotion
 from models.brake.plane_step import copy_row
 from models.brake.pressure import Air, Chambers, by_pressures, by_valves
-from models.machine.compiled import inlined, named_closure, njit
+from models.machine.compiled import closure_with_unique_name, inlined, njit
 
 
 class Row(NamedTuple):
@@ -218,9 +218,11 @@ class CompiledSamples:
 
 def compiled(step_function: Callable[..., Any], name: str) -> CompiledSamples:
     """Compiled samples that advance the vehicle by a compiled step function."""
-    compiled_some = inlined(named_closure(_with_globals(some_samples, go=step_function), name))
+    compiled_some = inlined(closure_with_unique_name(_with_globals(some_samples, go=step_function), name))
     return CompiledSamples(
-        njit(cache=True, error_model="numpy")(named_closure(_with_globals(samples, some=compiled_some), name))
+        njit(cache=True, error_model="numpy")(
+            closure_with_unique_name(_with_globals(samples, some=compiled_some), name)
+        )
     )
 
 

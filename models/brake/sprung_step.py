@@ -22,7 +22,7 @@ from models.brake.plane_records import TURNING_ROW, Wheels, report_of
 from models.brake.plane_step import set_slip_angle, time_of_rest, tyre
 from models.brake.surfaces import Surfaces, under_wheels
 from models.brake.wheel_step import StepInput, Wheel
-from models.machine.compiled import inlined, lean, named_closure, njit
+from models.machine.compiled import closure_with_unique_name, inlined, lean, njit
 from models.machine.stack import array, at, beyond, doubles, row, start
 from models.multibody.forces import (
     AXLE,
@@ -324,4 +324,4 @@ def advance_with(**replacements: Callable[..., Any]) -> Callable[..., Any]:
 
 def compiled(name: str, **replacements: Callable[..., Any]) -> Callable[..., Any]:
     """Compiled version of ``advance_with``, for an engine's compiled functions."""
-    return njit(cache=True, error_model="numpy")(named_closure(advance_with(**replacements), name))
+    return njit(cache=True, error_model="numpy")(closure_with_unique_name(advance_with(**replacements), name))

@@ -34,8 +34,8 @@ from models.contact.inputs import (
 from models.contact.linear_theory import LARGEST_PATCH, coefficient_at, flexibilities_at
 from models.core.errors import InputError
 from models.machine.compiled import compiled
-from models.machine.records import record, records, size_of, stacked
-from models.machine.stack import array, ask, beyond, doubles
+from models.machine.records import record, records_at_pointer, size_of, stack_records
+from models.machine.stack import array, beyond, call_at_address, doubles
 
 INPUT = record("shape_x", "shape_y", "pressing", "mu", "xi_x", "xi_y", "spin", "G", "nu")
 """Record of the inputs, as in ``kernel.h``: A, B (1/m) or a, b (m); load (N) or approach (m); mu; xi_x, xi_y; spin
@@ -89,9 +89,9 @@ def contact(kind, inputs, table, outputs):
     distance; outputs : pointer to an OUTPUT. A load or an approach of zero or less has zeros all over.
     """
     values, out, head = (
-        records(inputs, 1, INPUT)[0],
-        records(outputs, 1, OUTPUT)[0],
-        records(table, 1, DISTANCE_HEAD)[0],
+        records_at_pointer(inputs, 1, INPUT)[0],
+        records_at_pointer(outputs, 1, OUTPUT)[0],
+        records_at_pointer(table, 1, DISTANCE_HEAD)[0],
     )
     any_shape, answers = head.cells < 0.0, array(outputs, (OUTPUTS,))
     status = _status(kind, values, array(inputs, (INPUTS,)), any_shape)
@@ -99,7 +99,7 @@ def contact(kind, inputs, table, outputs):
     if status != FINE or (values.pressing <= 0.0 and not any_shape):
         return status
     if any_shape:
-        return ask(int(head.law), inputs, table, outputs)
+        return call_at_address(int(head.law), inputs, table, outputs)
     if not _press(kind, values, out):
         answers[:] = math.nan
         return NOT_PLAUSIBLE
@@ -190,7 +190,7 @@ def _linear(values, out):
 @compiled
 def _creep(values, table, out):
     """Fill the forces of FASTSIM on one ellipse, as by ``fastsim_many.forces``, with all arrays on the stack."""
-    head = records(table, 1, GRID_HEAD)[0]
+    head = records_at_pointer(table, 1, GRID_HEAD)[0]
     n, first = int(head.cells), int(head.first)
     wide = n * min(max((0.5 / (out.a / out.b)) ** 0.6, 1.0), 1.0 * MOST_STRIPS)
     m = 2 * math.ceil(wide / 2.0 - 1e-9)
@@ -198,11 +198,11 @@ def _creep(values, table, out):
     at = HEADER + 5 * n + k * (1 + 4 * first) + 4 * k * (k - 1)
     strips = strips_in(array(beyond(table, at + 1), (4, m)))
     cells = cells_in(array(beyond(table, HEADER), (5, n)), array(beyond(table, at), (1,))[0])
-    contacts, answers = stacked(1, CONTACT), stacked(1, FORCES)
+    contacts, answers = stack_records(1, CONTACT), stack_records(1, FORCES)
     contact, answer = contacts[0], answers[0]
     contact.a, contact.b, contact.load, contact.mu = out.a, out.b, out.load, values.mu
     contact.xi_x, contact.xi_y, contact.spin = values.xi_x, values.xi_y, values.spin
     contact.l1, contact.l2, contact.l3 = flexibilities_at(out.a, out.b, values.G, values.nu)
-    workspace = Workspace(stacked(1, SLIP), stacked(1, BLOCK))
+    workspace = Workspace(stack_records(1, SLIP), stack_records(1, BLOCK))
     forces_within(contacts, strips, cells, BLENDED, SECOND_ORDER, workspace, answers)
     out.fx, out.fy, out.mz, out.stick = answer.fx, answer.fy, answer.mz, answer.stick

@@ -33,7 +33,7 @@ from models.contact.simplified_theory import DEPTH_BY_APPROACH, FITS, LEAST_CELL
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError
 from models.machine.compiled import compiled
-from models.machine.records import record, records, size_of
+from models.machine.records import record, records_at_pointer, size_of
 from models.machine.stack import DOUBLES, array, beyond
 
 HEAD = record(
@@ -103,7 +103,7 @@ def table(distance: Distance, cells: int = 21, options: SimplifiedOptions = PLAI
 @compiled
 def surface_at(numbers, depth):
     """``Surface`` of the patch at a depth (m), as ``Patch.surface`` gives it, from its table."""
-    head = records(numbers, 1, HEAD)[0]
+    head = records_at_pointer(numbers, 1, HEAD)[0]
     m, n = int(head.lines_x), int(head.lines_y)
     x, y = array(beyond(numbers, HEADER), (2, m)), array(beyond(numbers, HEADER + 2 * m), (2, n))
     shape = int(head.rows), int(head.columns)
@@ -117,7 +117,7 @@ def surface_at(numbers, depth):
 @compiled
 def fit_at_depth(numbers, depth, modulus):
     """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA of the patch at a depth (m)."""
-    head = records(numbers, 1, HEAD)[0]
+    head = records_at_pointer(numbers, 1, HEAD)[0]
     return coarse_fit(surface_at(numbers, depth), int(head.net), int(head.shape), int(head.fit), modulus)
 
 
@@ -128,7 +128,7 @@ def depth_at_approach(numbers, approach, modulus):
 
     False position by Illinois' rule: the approach grows with the depth, for one valley in proportion.
     """
-    head = records(numbers, 1, HEAD)[0]
+    head = records_at_pointer(numbers, 1, HEAD)[0]
     low, most = head.low, head.edge - head.low
     over = approach - low
     left, off_left, right, off_right = 0.0, -over, 0.0, -over
@@ -166,7 +166,11 @@ def simplified(inputs, numbers, outputs):
     All pointers to doubles. Zeros where the bodies do not touch; no answer where the contact reaches the edge of the
     distance.
     """
-    values, out, head = records(inputs, 1, INPUT)[0], records(outputs, 1, OUTPUT)[0], records(numbers, 1, HEAD)[0]
+    values, out, head = (
+        records_at_pointer(inputs, 1, INPUT)[0],
+        records_at_pointer(outputs, 1, OUTPUT)[0],
+        records_at_pointer(numbers, 1, HEAD)[0],
+    )
     answers = array(outputs, (OUTPUTS,))
     answers[:] = 0.0
     if values.pressing <= head.low:
@@ -186,7 +190,7 @@ def _roll(values, numbers, depth, stiffness, out):
     """Fill the rolling forces of the patch at a depth (m) in ``out``, whose load is known, as
     ``simplified_theory.roll`` does.
     """
-    surface, head = surface_at(numbers, depth), records(numbers, 1, HEAD)[0]
+    surface, head = surface_at(numbers, depth), records_at_pointer(numbers, 1, HEAD)[0]
     box, cells, meshes = surface.box, -int(head.cells), int(head.net)
     net = strips(surface, cells, cells, int(head.shape))
     normalise(net, out.load)

@@ -35,7 +35,7 @@ from models.contact.undeformed_distance import Distance, quadratic
 from models.core.errors import InputError, Refused
 from models.engines.stability import ALLOWED_GROWTH, LONG_RUN, LinearMatrices, log_growth, longest_stable_step
 from models.machine.compiled import njit
-from models.machine.records import record, records, size_of
+from models.machine.records import record, records_at_pointer, size_of
 from models.machine.stack import array, at, beyond, doubles, start
 from models.rail.wheel_forces import REGULARISED_SPEED
 
@@ -152,15 +152,15 @@ def forces(parameter_table, t, q, v, generalised_forces):
 
     Not a number where a contact is none that the kernel can answer: the engines stop at that, and say so.
     """
-    head = records(parameter_table, 1, HEAD)[0]
+    head = records_at_pointer(parameter_table, 1, HEAD)[0]
     wheels = int(head.wheels)
     places, rates, sums = (
-        records(q, wheels, FREEDOM),
-        records(v, wheels, FREEDOM),
-        records(generalised_forces, wheels, FREEDOM),
+        records_at_pointer(q, wheels, FREEDOM),
+        records_at_pointer(v, wheels, FREEDOM),
+        records_at_pointer(generalised_forces, wheels, FREEDOM),
     )
     inputs, outputs = doubles(INPUTS), doubles(OUTPUTS)
-    given, answer = records(inputs, 1, INPUT)[0], records(outputs, 1, OUTPUT)[0]
+    given, answer = records_at_pointer(inputs, 1, INPUT)[0], records_at_pointer(outputs, 1, OUTPUT)[0]
     given.shape_x, given.shape_y, given.mu = head.curved_x, head.curved_y, head.mu
     given.G, given.nu = head.G, head.nu
     speed = max(abs(head.speed), REGULARISED_SPEED)

@@ -12,12 +12,12 @@ import numpy as np
 from numba.extending import register_jitable
 
 from models.core.errors import RunFailed
-from models.core.signals import Stacked
+from models.core.signals import StackedSignal
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import check_landings, check_trajectory
-from models.machine.compiled import named_closure, njit
+from models.machine.compiled import closure_with_unique_name, njit
 from models.vehicles.pitch_plane_equations import ADDED_TERMS, RIGHT_HAND_SIDES, parameter_numbers
 
 FLAT_ROAD_INPUT = np.zeros((1, 4))
@@ -26,7 +26,7 @@ FLAT_ROAD_INPUT = np.zeros((1, 4))
 
 def compiled_closure(closure: Any, cache_key: tuple) -> Any:
     """A compiled closure with its own index in numba's cache, which closures of one factory would otherwise share."""
-    closure = named_closure(closure, *cache_key)
+    closure = closure_with_unique_name(closure, *cache_key)
     return njit(cache=True, nogil=True, error_model="numpy")(closure)  # no check for masses of zero: there are none
 
 
@@ -79,7 +79,7 @@ def _summed_right_hand_side(right_hand_side, added_terms):
         right_hand_side(state, inputs, parameters, state_rates)
         added_terms(state, inputs, parameters, state_rates)
 
-    return register_jitable(named_closure(total, right_hand_side.__name__, added_terms.__name__))
+    return register_jitable(closure_with_unique_name(total, right_hand_side.__name__, added_terms.__name__))
 
 
 @dataclass
@@ -100,7 +100,7 @@ class PitchPlaneReference:
         self._input = (
             assembly.input
             if assembly.input is None or assembly.moment is None
-            else Stacked((assembly.input, assembly.moment))
+            else StackedSignal((assembly.input, assembly.moment))
         )
         self._p = parameter_numbers(assembly.parameters, assembly.vehicle)
 

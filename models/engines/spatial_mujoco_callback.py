@@ -184,14 +184,12 @@ def _transfer_forces_to_joints(parts, mujoco_state, workspace, joint_forces):
 
 
 @register_jitable
-def _curve_force(curve_pairs, pair_count, travel_or_rate):
+def _curve_force(pairs, number_count, argument):
     """Force on a curve given as pairs (argument, force, ...); beyond its ends the outer straight pieces continue."""
     i = 0
-    while i < pair_count - 4 and travel_or_rate >= curve_pairs[i + 2]:
+    while i < number_count - 4 and argument >= pairs[i + 2]:
         i += 2
-    return curve_pairs[i + 1] + (curve_pairs[i + 3] - curve_pairs[i + 1]) / (curve_pairs[i + 2] - curve_pairs[i]) * (
-        travel_or_rate - curve_pairs[i]
-    )
+    return pairs[i + 1] + (pairs[i + 3] - pairs[i + 1]) / (pairs[i + 2] - pairs[i]) * (argument - pairs[i])
 
 
 @register_jitable

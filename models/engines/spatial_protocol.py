@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from models.core.errors import InputError, Refused
-from models.core.steps import divides, dividing_step
+from models.core.steps import dividing_step, step_divides
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
@@ -127,7 +127,7 @@ def _check_run(
 def check_divides(engine: str, run_settings: Settings) -> None:
     """Raise Refused for a step that does not divide the duration."""
     step, duration = run_settings.step, run_settings.duration
-    if not divides(step, duration):
+    if not step_divides(step, duration):
         raise Refused(
             engine,
             f"the step {step:g} s does not divide the duration {duration:g} s; use for "

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.finding import Finding, Weight
+from models.core.finding import Finding, FindingWeight
 
 GAP_PERIODS = 1.5
 """Distance of two samples, in periods, above which there is a gap between them."""
@@ -32,7 +32,7 @@ REPEATED_TIME_SHARE = 0.01
 """Share of the samples that may repeat the time of another one: dropping them then does no harm."""
 
 
-ReportFinding = Callable[[str, Weight, str, float, str, Iterable[float]], None]
+ReportFinding = Callable[[str, FindingWeight, str, float, str, Iterable[float]], None]
 """Function that records a finding: check, severity, text, size, unit and times."""
 
 
@@ -92,7 +92,7 @@ def _timing_of_valid_times(times: np.ndarray, place: str, signal_names: tuple[st
     """``Timing`` of values (n,) that can be times (s)."""
     findings, sample_count = list[Finding](), len(times)
 
-    def report(check: str, weight: Weight, text: str, size: float, unit: str, times: Iterable[float]) -> None:
+    def report(check: str, weight: FindingWeight, text: str, size: float, unit: str, times: Iterable[float]) -> None:
         findings.append(
             Finding(check, weight, place, f"{place}: {text}.", size, unit, signal_names, tuple(map(float, times)))
         )
@@ -239,7 +239,7 @@ def _report_jitter(times: np.ndarray, period: float, report: ReportFinding) -> N
     deviations = steps[steps <= GAP_PERIODS * period] - period
     spread = float(deviations.std())
     if spread > EVEN_CLOCK_SHARE * period:
-        weight: Weight = "doubt" if spread > JITTER_SHARE * period else "note"
+        weight: FindingWeight = "doubt" if spread > JITTER_SHARE * period else "note"
         report(
             "jitter",
             weight,

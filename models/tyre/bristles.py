@@ -23,7 +23,7 @@ from models.contact.fastsim_many import forces, forces_within
 from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, Workspace, cells_in, strips_in
 from models.core.errors import InputError
 from models.machine.compiled import lean
-from models.machine.records import records, stacked
+from models.machine.records import records_at_pointer, stack_records
 from models.machine.stack import start
 
 FADING_SPEED = 0.1
@@ -63,15 +63,15 @@ def tyre_forces(contacts, sliding_velocities, strips, cells, middle_cells, force
     tread (m/s); strips, cells, middle_cells : the patch's net as ``Grid`` holds it.
     """
     w = len(contacts)
-    patches, answers = records(start(contacts), w, CONTACT), records(start(forces_out), w, FORCES)
+    patches, answers = records_at_pointer(start(contacts), w, CONTACT), records_at_pointer(start(forces_out), w, FORCES)
     lines, cell_table = strips_in(strips), cells_in(cells, middle_cells)
-    room, slowest = Workspace(stacked(w, SLIP), stacked(1, BLOCK)), FADING_SPEED
+    room, slowest = Workspace(stack_records(w, SLIP), stack_records(1, BLOCK)), FADING_SPEED
     for i in range(w):
         slowest = min(slowest, sliding_velocities[i, 3])
     _creepages(1.0, patches, sliding_velocities)
     forces_within(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, answers)
     if slowest < FADING_SPEED:
-        backwards = stacked(w, FORCES)
+        backwards = stack_records(w, FORCES)
         _creepages(-1.0, patches, sliding_velocities)
         forces_within(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, backwards)
         _blend_directions(sliding_velocities, backwards, answers)

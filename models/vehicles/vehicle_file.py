@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.scene_file import existing_file, parse
+from models.core.scene_file import existing_file, parse_toml
 from models.core.strict import read
 from models.vehicles.spatial import (
     AntiRollBar,
@@ -66,7 +66,7 @@ def load_vehicle(
     ``scene_path`` and ``key_path`` say who asked for it, for the message if there is none. allows_reduced_vehicle : may
     it have [reduced]? allows_towing : may it tow bodies by a hitch? Raises InputError."""
     path = vehicle_path(vehicle_name, scene_folder, scene_path, key_path)
-    vehicle = build_vehicle(parse(path), path.name)
+    vehicle = build_vehicle(parse_toml(path), path.name)
     if vehicle.limits and not allows_reduced_vehicle:
         raise InputError(
             scene_path,

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from models.core.discretisation import errors_of
+from models.core.discretisation import error_estimates_of
 from models.core.errors import InputError, suggestion_phrase
-from models.core.result import Result, load
+from models.core.result import Result, load_result
 from models.core.whole_files import whole_file
 from models.measured.channel import Channel, Source
 from models.measured.file_kinds import is_measurement
@@ -242,7 +242,7 @@ def _channel_match(
     if not is_within.any():
         return None
     read = CubicSpline(channel_pair.run_times, channel_pair.run)(times[is_within])
-    stated = errors_of(run).get(name.partition(", ")[0])
+    stated = error_estimates_of(run).get(name.partition(", ")[0])
     return ChannelComparison(
         name, unit, times[is_within], read, channel_pair.values[is_within], np.nan if stated is None else stated.error
     )
@@ -255,7 +255,7 @@ def saved_results(file_or_folder: Path) -> dict[str, Result]:
     files = [file_or_folder] if file_or_folder.is_file() else sorted(file_or_folder.rglob("*.nc"))
     if not files:
         raise InputError(file_or_folder, "", None, "holds no saved result (.nc): name the folder of a run")
-    return {file.stem: load(file) for file in files}
+    return {file.stem: load_result(file) for file in files}
 
 
 def report(run_path: Path, measurement: Path, folder: Path, time_shift_seconds: float | None = None) -> dict[str, Any]:

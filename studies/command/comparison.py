@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from models.core.discretisation import errors_of
+from models.core.discretisation import error_estimates_of
 from models.core.errors import InputError
-from models.core.result import Result, load
+from models.core.result import Result, load_result
 from models.core.told import DOUBT_ATTRIBUTES, Results
 from models.core.whole_files import whole_file
 from studies.command.differences import Quantity, QuantityDifference
@@ -117,7 +117,7 @@ def _result_files(folder: Path) -> dict[str, Path]:
 def _holds_same_table(path: Path) -> bool:
     """Whether the CSV file of the same name as a netCDF file holds the same table: all channels have one common
     axis."""
-    return path.with_suffix(".csv").exists() and len(load(path).data.sizes) < 2
+    return path.with_suffix(".csv").exists() and len(load_result(path).data.sizes) < 2
 
 
 def results_of(first_path: Path, second_path: Path) -> dict[str, Result]:
@@ -135,20 +135,21 @@ def results_of(first_path: Path, second_path: Path) -> dict[str, Result]:
 def _result_of_file(path: Path) -> Result | None:
     """The saved result of a netCDF file, or of the netCDF file beside a CSV table; None if there is none."""
     netcdf_path = path.with_suffix(".nc")
-    return load(netcdf_path) if netcdf_path.is_file() else None
+    return load_result(netcdf_path) if netcdf_path.is_file() else None
 
 
 def _quantities_of_file(path: Path) -> Iterator[tuple[str, Quantity]]:
     """Yield name and values of each quantity of a file, with the error that its result states."""
     yield from _with_errors(
-        _result_of_file(path), channels_of(load(path).data) if path.suffix == ".nc" else _quantities_of_table(path)
+        _result_of_file(path),
+        channels_of(load_result(path).data) if path.suffix == ".nc" else _quantities_of_table(path),
     )
 
 
 def _with_errors(run: Result | None, quantities: Iterable[tuple[str, Quantity]]) -> Iterator[tuple[str, Quantity]]:
     """Yield name and values of each quantity of a result, with the error that the result states for the channel, if
     any."""
-    errors = {} if run is None else errors_of(run)
+    errors = {} if run is None else error_estimates_of(run)
     for name, quantity in quantities:
         stated = errors.get(name.partition(", ")[0])
         yield name, quantity if stated is None else replace(quantity, error=stated.error)

@@ -20,7 +20,7 @@ from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_quiet import installed_callback
 from models.engines.mujoco_tree import principal_inertias
 from models.machine.compiled import lean
-from models.machine.records import records, size_of, stacked
+from models.machine.records import records_at_pointer, size_of, stack_records
 from models.machine.stack import array, beyond, doubles, row
 from models.multibody.numbers import Handling
 from models.multibody.tree import cross, dot, plus, three_from, times
@@ -54,7 +54,7 @@ def add_car_forces(table, t, q, v, forces_out):
     turning = v[4], c_roll * v[5], s_roll * v[5]
     frame, speed_forward, speed_leftward = (x, y, z, turning), c_yaw * v[0] + s_yaw * v[1], c_yaw * v[1] - s_yaw * v[0]
     passing = speed_forward, speed_leftward, head[0]
-    contacts, forces = doubles(4 * CONTACT_NUMBERS), stacked(4, FORCES)
+    contacts, forces = doubles(4 * CONTACT_NUMBERS), stack_records(4, FORCES)
     wheel_positions, pushes = doubles(12), doubles(12)
     left = wheel_positions, pushes, contacts
     moment = plus(
@@ -66,12 +66,12 @@ def add_car_forces(table, t, q, v, forces_out):
     _add_bar_forces((head[6], head[7], head[8]), 0, left, q, forces_out)
     _add_bar_forces((head[9], head[10], head[11]), 2, left, q, forces_out)
     forces_within(
-        records(contacts, 4, CONTACT),
+        records_at_pointer(contacts, 4, CONTACT),
         strips_in(array(beyond(cells, 5 * CELLS), (4, int(head[12])))),
         cells_in(array(cells, (5, CELLS)), head[13]),
         THREE_BRISTLES,
         SECOND_ORDER_MARCH,
-        Workspace(stacked(4, SLIP), stacked(1, BLOCK)),
+        Workspace(stack_records(4, SLIP), stack_records(1, BLOCK)),
         forces,
     )
     force_along, across, turn, lift = 0.0, 0.0, 0.0, 0.0

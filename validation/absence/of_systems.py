@@ -19,7 +19,7 @@ from typing import Any
 from unittest import mock
 
 from models.core.errors import Refused
-from models.core.scene_effects import module_of, names_of, with_effects
+from models.core.scene_effects import effect_names_of, effect_of, with_effects
 from models.core.systems import SYSTEMS, modules_of
 from validation.absence.probes import registered_callbacks
 from validation.common.rows import Observed, Row, System, behaviour_row
@@ -76,7 +76,7 @@ def counts_and_paths(system: str, scene: Any, quick: bool = False) -> dict[str, 
 def addable_effects(system: str) -> tuple[str, ...]:
     """Names of the effects that can be added to a system's bare scene, with usual values or with hand-written
     tables."""
-    modules = {name: module_of(system, name) for name in names_of(system)}
+    modules = {name: effect_of(system, name) for name in effect_names_of(system)}
     return tuple(
         name
         for name, module in modules.items()
@@ -92,13 +92,13 @@ def scenes_with_and_without(system: str, effect: str) -> tuple[Any, Any]:
     if effect in hand_written_tables(system):
         scene_without, scene_with = (bare_scene(system, **tables) for tables in hand_written_tables(system)[effect])
         return scene_without, scene_with
-    needs = module_of(system, effect).NEEDS
+    needs = effect_of(system, effect).NEEDS
     return with_effects(bare_scene(system), *needs), with_effects(bare_scene(system), *needs, effect)
 
 
 def declared_counts(system: str, effect: str, engines: Iterable[str]) -> Counts:
     """Counts of components that an effect adds to a model in each engine, as its file declares them."""
-    counts = module_of(system, effect).COUNTS
+    counts = effect_of(system, effect).COUNTS
     return {engine: {**counts.get("all", {}), **counts.get(engine, {})} for engine in engines}
 
 
@@ -120,7 +120,7 @@ def _counts_without_effect(system: str, effect: str, quick: bool) -> Counts:
     """Engine -> counts of components in the scene without an effect, but with the effects that it needs."""
     if effect in hand_written_tables(system):
         return _counts_with_tables(system, (), json.dumps(hand_written_tables(system)[effect][0]), quick)
-    return _counts_with_tables(system, module_of(system, effect).NEEDS, "{}", quick)
+    return _counts_with_tables(system, effect_of(system, effect).NEEDS, "{}", quick)
 
 
 @cache
@@ -153,7 +153,7 @@ def absence_facts(systems: tuple[str, ...] = tuple(BARE_SCENE_FILES)) -> dict[st
 
 
 def _modules_of_effects(system: str) -> dict[str, tuple[str, ...]]:
-    return {name: module_of(system, name).MODULES for name in names_of(system)}
+    return {name: effect_of(system, name).MODULES for name in effect_names_of(system)}
 
 
 def _effect_facts(
@@ -183,7 +183,7 @@ def _without_modules(system: str, modules: list[str]) -> Iterator[None]:
     sys.modules.update(blocked)
     package = import_module(SYSTEMS[system].effects)
     with mock.patch.object(package, "__path__", []), mock.patch.object(package, "TABLE", {}, create=True):
-        assert not names_of(system)
+        assert not effect_names_of(system)
         yield
     for name in modules:
         del sys.modules[name]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.scene_effects import module_of, names_of, scene_without
+from models.core.scene_effects import effect_names_of, effect_of, scene_without
 from models.core.systems import DEFAULT_SYSTEM
 from models.core.time_series import write_time_series
 from models.engines.model import Model
@@ -42,14 +42,14 @@ PRESCRIBED_SETTINGS = {"integrator": "GeneralizedAlpha"}
 """Exudyn settings for a scene with a prescribed pitch: only this integrator solves for the prescribed pitch. The scene
 without the effect uses the same settings."""
 
-EFFECTS = names_of(DEFAULT_SYSTEM)
+EFFECTS = effect_names_of(DEFAULT_SYSTEM)
 """Names of all effects of the pitch-plane vehicle."""
 
 
 def required_effects(effect: str) -> dict[str, Any]:
     """Scene tables of the effects without which an effect cannot be used."""
-    module = module_of(DEFAULT_SYSTEM, effect)
-    return {name: module_of(DEFAULT_SYSTEM, name).EXAMPLE for name in module.NEEDS} | module.BESIDE
+    module = effect_of(DEFAULT_SYSTEM, effect)
+    return {name: effect_of(DEFAULT_SYSTEM, name).EXAMPLE for name in module.NEEDS} | module.BESIDE
 
 
 def scene(effects: dict[str, Any], step_count: int, folder: Path, prescribed: bool = False) -> Scene:
@@ -91,7 +91,7 @@ def scenes_without_and_with(effect: str, step_count: int, folder: Path) -> tuple
     needed, prescribed, module = (
         required_effects(effect),
         effect.startswith("prescribed"),
-        module_of(DEFAULT_SYSTEM, effect),
+        effect_of(DEFAULT_SYSTEM, effect),
     )
     scene_below = scene(needed, step_count, folder, prescribed)
     if hasattr(module, "leave_out"):  # the vehicle has it unless the scene says otherwise
@@ -114,7 +114,7 @@ def count_changes(effect: str, engine: str, folder: Path) -> dict[str, int]:
 def declared_changes(effect: str, engine: str) -> dict[str, int]:
     """Changes of the numbers of components in an engine's model that an effect declares in its COUNTS; zero changes are
     left out."""
-    table = module_of(DEFAULT_SYSTEM, effect).COUNTS
+    table = effect_of(DEFAULT_SYSTEM, effect).COUNTS
     return {key: value for key, value in {**table.get("all", {}), **table.get(engine, {})}.items() if value}
 
 

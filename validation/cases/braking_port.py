@@ -21,7 +21,7 @@ from models.brake.controller import SAMPLE, Controller, Sample
 from models.brake.port.ask import ControllerFailed, ask
 from models.brake.port.example import Example
 from models.brake.port.setup import ControllerRun, PortTable, controller_of_run
-from models.machine.timing import median
+from models.machine.timing import bootstrap_median
 from models.systems.braking.march import BrakingPath
 from models.systems.braking.run import run
 from models.systems.braking.scene import build
@@ -198,7 +198,7 @@ def _exchange_times(
         for i in range(round_count):
             for name, controller in controllers.items():
                 seconds.setdefault(name, []).append(_round_seconds(controller, i * ROUND_EXCHANGES))
-    return {name: list(median(1e6 * np.array(values) / ROUND_EXCHANGES)) for name, values in seconds.items()}
+    return {name: list(bootstrap_median(1e6 * np.array(values) / ROUND_EXCHANGES)) for name, values in seconds.items()}
 
 
 def _round_seconds(controller: Controller, first_number: int) -> float:

@@ -24,7 +24,7 @@ from models.engines.mujoco_march import Marcher
 from models.engines.mujoco_quiet import installed_callback
 from models.machine.compiled import njit
 from models.machine.stack import start
-from models.machine.timing import interleave, median, spelled
+from models.machine.timing import bootstrap_median, interleave, interval_text
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
 from validation.contact import slow_wheels
 
@@ -165,7 +165,7 @@ class MeasuredTimes:
         """Median time (s) of a step, its parts for engine, kernel and bridge, and the bridge's share of the step."""
         a, b, c = self.times_by_round(setup)
         step, bare, kernel = (float(np.median(round_times)) for round_times in (a, b, c))
-        share = median((a - b - c) / a)
+        share = bootstrap_median((a - b - c) / a)
         return {
             "engine": setup.engine,
             "method": setup.method,
@@ -178,7 +178,7 @@ class MeasuredTimes:
             "kernel": kernel,
             "over": step - bare - kernel,
             "share": share,
-            "range": median(a)[1:],
+            "range": bootstrap_median(a)[1:],
         }
 
 
@@ -266,14 +266,14 @@ def _cost_rows(measured_times: MeasuredTimes) -> list[Row]:
         step, bare, kernel = measured_times.times_by_round(setup)
         name, calls = f"contact_bridges.{setup.engine}.{setup.method}", CALLS_PER_STEP[setup.method]
         if setup.engine == "mujoco":
-            value, low, high = median(step / (bare + kernel))
+            value, low, high = bootstrap_median(step / (bare + kernel))
             what, bound = f"ratio to the step without contact plus {4 * calls} kernel times", 1.3
         else:
-            value, low, high = median((step - bare - kernel) / step)
+            value, low, high = bootstrap_median((step - bare - kernel) / step)
             what, bound = "share of the bridge", 0.25
         what = (
             f"{ENGINE_NAMES[setup.engine]}, {setup.method}: {what}, step with FASTSIM at four wheels (21 x 21, native, "
-            f"{spelled(step, 1e6)} us), 95 % interval {low:.3f} to {high:.3f}"
+            f"{interval_text(step, 1e6)} us), 95 % interval {low:.3f} to {high:.3f}"
         )
         rows.append(Observed(name, SYSTEM, what, value, "").aim(bound, TIMING_NOTE))
     return rows

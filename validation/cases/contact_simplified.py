@@ -15,7 +15,7 @@ from models.contact.hertz import by_load
 from models.contact.patches import Patch, separate
 from models.contact.simplified_theory import PAPER, PLAIN, NormalContact, SimplifiedOptions, load_at_depth, press, roll
 from models.contact.undeformed_distance import quadratic
-from models.machine.seconds import cost
+from models.machine.seconds import seconds_text
 from models.machine.timing import interleave
 from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_shapes import (
@@ -278,8 +278,8 @@ def _time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row]:
         Observed(
             "contact_simplified.time.forces",
             SYSTEM,
-            f"ratio of the time of FASTSIM twice with the refit, {cost(seconds_by_program['roll'])}, to that of "
-            f"the 1982 program, {cost(seconds_by_program['1982'])}",
+            f"ratio of the time of FASTSIM twice with the refit, {seconds_text(seconds_by_program['roll'])}, to that "
+            f"of the 1982 program, {seconds_text(seconds_by_program['1982'])}",
             _time_ratio(seconds_by_program, "roll", "1982"),
             "",
         ).beside("about 3 with the contact, which contact_price compares", why),
@@ -287,7 +287,8 @@ def _time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row]:
             "contact_simplified.time.exact",
             SYSTEM,
             "ratio of the time of the exact normal problem at the same fineness, "
-            f"{cost(seconds_by_program['exact'])}, to that of this method, {cost(seconds_by_program['press'])}",
+            f"{seconds_text(seconds_by_program['exact'])}, to that of this method, "
+            f"{seconds_text(seconds_by_program['press'])}",
             _time_ratio(seconds_by_program, "exact", "press"),
             "",
         ).beside("", "what the theory saves", "none"),

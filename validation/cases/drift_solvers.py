@@ -13,7 +13,7 @@ import numpy as np
 
 from models.core.noise import normal_samples
 from models.core.result import Result
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.drift.growth import pitch_rate_of_forces, pitch_variance, rigid_pitch, sinh_law_rate
 from models.drift.score import section_forces
 from models.engines.assembly import Assembly, Settings
@@ -150,7 +150,7 @@ def _treatment_record(
     step: float,
 ) -> Saved:
     forces = quiet_assembly.input
-    assert isinstance(forces, Sampled)
+    assert isinstance(forces, SampledSignal)
     settings = Settings(method, step, NOISY_SECONDS)
     clean = _noisy_states(engine, quiet_assembly, forces.values, cutoff, settings)
     rows = np.rint(np.array(GROWTH_WINDOW) / step).astype(int)
@@ -179,7 +179,7 @@ def _noisy_states(
 ) -> np.ndarray:
     """States (n, 8) of a run under force samples (n, 2), which are low-passed before the run if ``cutoff`` (Hz) is
     given."""
-    forces = Sampled(_low_pass(force_samples, cutoff), 1 / NOISE_SAMPLING_RATE, held=False)
+    forces = SampledSignal(_low_pass(force_samples, cutoff), 1 / NOISE_SAMPLING_RATE, held=False)
     return build(engine, replace(assembly, input=forces), settings).run().states
 
 

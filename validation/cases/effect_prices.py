@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from models.engines.protocol import build, check_trajectory
-from models.machine.timing import describe, interleave, paired_ratio
+from models.machine.timing import interleave, paired_ratio, timing_statistics
 from models.systems.pitch_plane.run import output_channels
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 from validation.absence.bare_cars import ratio_of_cars
@@ -307,7 +307,7 @@ def _price_of_effect(effect: str, engine: str, folder: Path, round_count: int) -
         "engine": engine,
         "adds": changes_text(count_changes(effect, engine, folder)) or "nothing",
         "step": float(np.median(seconds[0])) / EFFECT_STEP_COUNT * 1e6,
-        "us": describe(added),
+        "us": timing_statistics(added),
         "ratio": paired_ratio(seconds[1], seconds[0]),
     }
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.result import Result
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.drift.growth import (
     FAST_PITCH_FREQUENCY,
     growth_rate,
@@ -103,8 +103,8 @@ def _deviations_by_method(true_run: Result, folder: Path, quick: bool) -> Saved:
     return {name: values.tolist() for name, values in spreads.items()}
 
 
-def _force_samples(assembly: Assembly) -> Sampled:
-    assert isinstance(assembly.input, Sampled)
+def _force_samples(assembly: Assembly) -> SampledSignal:
+    assert isinstance(assembly.input, SampledSignal)
     return assembly.input
 
 

@@ -14,7 +14,7 @@ from models.engines.free_vehicle_mujoco import FreeMujoco
 from models.engines.mujoco_march import Marcher
 from models.engines.mujoco_quiet import installed_callback
 from models.machine.compiled import njit
-from models.machine.timing import interleave, median
+from models.machine.timing import bootstrap_median, interleave
 from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Controls, Handling, TyreParameters
 from models.road.plane_waves import plane_waves
@@ -319,7 +319,7 @@ def _tyre_cost_row() -> Row:
     bare.numbers[at.TYRES] = 0.0
     jobs = _timed_march(car, steps), _timed_march(bare, steps), lambda: _repeat_four_tyres(4 * steps)
     full, none, kernel = interleave(jobs, TIMING_ROUNDS, 0.001, clock=time.process_time)
-    ratio, low, high = median(full / (none + kernel) - 1.0)
+    ratio, low, high = bootstrap_median(full / (none + kernel) - 1.0)
     return Observed(
         "handling.price",
         SYSTEM,

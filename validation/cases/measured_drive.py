@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.scene_file import parse
+from models.core.scene_file import parse_toml
 from models.identification.fit import fit
 from models.identification.of_scene import problem_of
 from models.identification.uncertainty import uncertainty
@@ -46,7 +46,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _drive_scene(stretch: list[float], stiffness_ratios: tuple[float, float] = (1.0, 1.0)) -> HandlingScene:
-    table = parse(SCENES / "measured_drive.toml")
+    table = parse_toml(SCENES / "measured_drive.toml")
     table["tyres"]["cornering"] = list(stiffness_ratios)
     table["manoeuvres"]["measured"]["stretch"] = stretch
     return build(table, "measured drive", SCENES)

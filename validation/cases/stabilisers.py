@@ -7,7 +7,7 @@ import numpy as np
 
 from models.core.noise import normal_samples
 from models.core.result import Result
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.core.time_series import write_time_series
 from models.engines.assembly import Assembly, Settings
 from models.engines.stability import first_order, linearised_matrices
@@ -136,7 +136,7 @@ def _dead_band_and_moment_rows(build_follower: BuildFollower, duration: float) -
     equations."""
     assembly = assembly_of_scene(build_follower({}, DEAD_BAND_SPRING))
     times = STEP * np.arange(round(duration / STEP) + 1)
-    moment = Sampled(500.0 * np.sin(30.0 * times)[:, None], STEP, held=False)
+    moment = SampledSignal(500.0 * np.sin(30.0 * times)[:, None], STEP, held=False)
     free = assembly_of_scene(build_follower({}, {}))
     laws: dict[str, tuple[Assembly, str]] = {
         "dead_band": (assembly, "a pitch spring with a dead band of 0.01 rad"),

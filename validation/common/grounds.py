@@ -13,7 +13,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from models.core.assumptions import BrokenAssumption, broken_of, result_observer
+from models.core.assumptions import BrokenAssumption, broken_assumptions_of, result_observer
 from models.core.result import Result
 
 ANY_ASSUMPTION = ""
@@ -45,7 +45,7 @@ class Grounds:
             self.breaches, self.rows_rest_on_them, self.is_closed = [], False, False
         self.part_index = _instruction_index()
         name, reasons = f"{run.data.attrs['title']}, {run.data.attrs['engine']}".strip(", "), _ALLOWED_ASSUMPTIONS.get()
-        for broken in broken_of(run):
+        for broken in broken_assumptions_of(run):
             self.breaches.append(Breach(name, broken, reasons.get(broken.name) or reasons.get(ANY_ASSUMPTION, "")))
 
     def breaches_of_row(self, is_allowed: bool) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from models.contact.fastsim import Creep, RollingEllipse, fastsim
 from models.contact.hertz import by_axes
 from models.contact.simplified_theory import FINE_CELLS, PAPER, NormalContact, Rolling, roll
-from models.machine.seconds import cost
+from models.machine.seconds import seconds_text
 from models.machine.timing import interleave
 from models.systems.contact.run import interpenetrating
 from models.systems.contact.work_precision import ContactCase
@@ -83,8 +83,9 @@ def table(comparison: dict[str, Any]) -> Table:
         ("time in the paper", "1", "about 3"),
         (
             "time, measured",
-            f"1 ({cost(t['1982'])})",
-            f"{np.median(both / t['1982']):.0f} ({cost(both)}); forces alone {np.median(t['1983'] / t['1982']):.0f}",
+            f"1 ({seconds_text(t['1982'])})",
+            f"{np.median(both / t['1982']):.0f} ({seconds_text(both)}); "
+            f"forces alone {np.median(t['1983'] / t['1982']):.0f}",
         ),
     )
     return Table(

@@ -141,7 +141,9 @@ def _double_drag(handling: Handling) -> None:
 
 
 def _preload_patch(change: Callable[[Preloads], Preloads]) -> Patch:
-    return attribute_patch("models.multibody.numbers:preloads", lambda real: lambda vehicle: change(real(vehicle)))
+    return attribute_patch(
+        "models.multibody.numbers:static_preloads", lambda real: lambda vehicle: change(real(vehicle))
+    )
 
 
 def _first_value_larger(values: dict[str, float]) -> dict[str, float]:

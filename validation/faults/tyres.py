@@ -107,7 +107,7 @@ def tyre_table_patch(column: int, factor: float, tyre_numbers: tuple[int, ...] =
 
         return planted
 
-    return attribute_patch("models.multibody.numbers:table", table)
+    return attribute_patch("models.multibody.numbers:free_vehicle_table", table)
 
 
 FAULTS = tuple(

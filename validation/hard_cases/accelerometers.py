@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.engines.protocol import build
 from models.sensors.rigid_body_motion import (
     StartState,
@@ -63,7 +63,7 @@ def _readings_of_run(
         effects={"accelerometers": {"sampling_rate": 1 / SAMPLE_PERIOD, "sensors": sensors, "deviation": noise}},
     )
     assembly = (
-        base if initial is None else driven_by_forces(base, Sampled(np.zeros((400, 2)), SAMPLE_PERIOD, held=True))
+        base if initial is None else driven_by_forces(base, SampledSignal(np.zeros((400, 2)), SAMPLE_PERIOD, held=True))
     )
     engine_settings = settings(engine, SAMPLE_PERIOD, 0.3)
     model = build(engine, assembly, engine_settings)

@@ -5,7 +5,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly
 from models.systems.pitch_plane.effects.contact_points import contact_points
@@ -30,7 +30,7 @@ def step_response_error(engine: str, folder: Path) -> float:
     values[1:] = LOAD
     p, worst = base.parameters, 0.0
     for step in STEPS:
-        assembly = driven_by_forces(base, Sampled(values, 2e-2, held=True))
+        assembly = driven_by_forces(base, SampledSignal(values, 2e-2, held=True))
         if engine == "exudyn":  # its implicit integrators refuse held samples
             path = run(engine, assembly, min(step, 2e-3), 0.1)
         else:
@@ -68,7 +68,7 @@ def _ramp_error(engine: str, step: float, integrator: str) -> float:
     """Largest difference of the tyre compression from the ramp's closed form at the time of each row, divided by
     f/k."""
     base, rising = vehicle(), LOAD * np.minimum(np.arange(6.0), 1.0)[:, None] * np.ones(2)
-    assembly, p = driven_by_forces(base, Sampled(rising, 2e-2, held=False)), base.parameters
+    assembly, p = driven_by_forces(base, SampledSignal(rising, 2e-2, held=False)), base.parameters
     path = run(engine, assembly, step, 0.1, integrator)
     return largest_magnitude(_compressions(assembly, path)[:, 0] - _compression_under_ramp(path.times, p.k1, p.d1)) / (
         LOAD / p.k1
@@ -96,7 +96,7 @@ def undamped_contact_error(engine: str, folder: Path) -> float:
     compression divided by f/k."""
     base = vehicle(d1=0.0, d2=0.0)
     values = LOAD * np.random.default_rng(4).standard_normal((100, 2))
-    assembly = driven_by_forces(base, Sampled(values, 1e-3, held=True))
+    assembly = driven_by_forces(base, SampledSignal(values, 1e-3, held=True))
     path = run(engine, assembly, 1e-3, 0.1)
     stiffness = base.parameters.k1
     return largest_magnitude(_compressions(assembly, path)[:100] - values / stiffness) / (LOAD / stiffness)

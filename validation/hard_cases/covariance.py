@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.engines.assembly import Assembly
 from models.systems.pitch_plane.tangent import TangentPath as ErrorPath
 from models.systems.pitch_plane.tangent import noise_covariances
@@ -42,7 +42,7 @@ def covariance_error(engine: str, folder: Path) -> float:
 
 def _covariance_recursion() -> np.ndarray:
     assembly = _base_assembly(np.zeros((SAMPLES, 2)))
-    assert isinstance(assembly.input, Sampled)
+    assert isinstance(assembly.input, SampledSignal)
     return noise_covariances(ErrorPath(assembly, assembly.input, round(SAMPLE_PERIOD / STEP), SAMPLES), 1.0)[-1]
 
 

@@ -17,7 +17,7 @@ from models.contact.material import MaterialPair
 from models.contact.profiles import profile
 from models.contact.standard_profiles import built_in
 from models.contact.theories import ExactOnEllipse, Fastsim
-from models.core.result import Result, load
+from models.core.result import Result, load_result
 from models.drift.growth import drift_off_time
 from models.drift.point_mass import euler_covariance
 from models.ensemble.statistics import deviation_with_error, quantile_with_interval
@@ -118,7 +118,7 @@ def flipped_bit_error(implementation: str, folder: Path) -> float:
     content = bytearray((folder / "run.nc").read_bytes())
     content[content.index(heave.tobytes()) + 100] ^= 4
     (folder / "run.nc").write_bytes(content)
-    return float(np.abs(load(folder / "run.nc")["z3"] - heave).max())
+    return float(np.abs(load_result(folder / "run.nc")["z3"] - heave).max())
 
 
 def profile_with_spike() -> Any:

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.core.discretisation import Estimate, errors_of, largest_estimate
+from models.core.discretisation import Estimate, error_estimates_of, largest_estimate
 from models.core.errors import InputError
 from models.core.result import Result
-from models.core.signals import SNAP_SHARE, Sampled
+from models.core.signals import SNAP_SHARE, SampledSignal
 from models.core.time_series import write_time_series
 from models.engines.protocol import build
 from models.engines.stability import first_order, linearised_matrices
@@ -39,7 +39,7 @@ from validation.hard_cases.setups import (
 def momentum_error(engine: str, interpolation: str, values: np.ndarray, sample_period: float, step: float) -> float:
     """Error of the momentum sum m z' against the exact impulse of the wheel forces, divided by the largest impulse."""
     base = vehicle("asymmetric_twin")
-    forces = Sampled(values, sample_period, held=interpolation == "held")
+    forces = SampledSignal(values, sample_period, held=interpolation == "held")
     steps = round((len(values) - 1) * sample_period / step)
     path = run(engine, setups.driven_by_forces(base, forces), step, steps * step)
     p, stride = base.parameters, round(sample_period / step)
@@ -83,7 +83,7 @@ def impulse_naive(folder: Path) -> str:
     base = vehicle()
     values = static_forces(base, 1002, 2e-3, noise=800.0).values
     ends = [
-        run("reference", setups.driven_by_forces(base, Sampled(values, 2e-3, is_held)), 1e-3, 2.0).states[-1, 3]
+        run("reference", setups.driven_by_forces(base, SampledSignal(values, 2e-3, is_held)), 1e-3, 2.0).states[-1, 3]
         for is_held in (True, False)
     ]
     return f"held and linear end {abs(ends[0] - ends[1]) / abs(ends[0]):.1%} apart in pitch: half a sample of shift"
@@ -100,7 +100,7 @@ def halving_ratio(engine: str, folder: Path) -> float:
 
 
 @dataclass(frozen=True)
-class StageTimeSamples(Sampled):
+class StageTimeSamples(SampledSignal):
     """Faulty held samples: every stage reads the sample at its time, so that the last stage of a step reads the next
     sample."""
 
@@ -114,7 +114,7 @@ def halving_naive(folder: Path) -> str:
     """Result without the remedy, as text: pitch under a force that is read at the time of each stage."""
     base = vehicle(geometry="linear")
     values = static_forces(base, 251, 2e-3, noise=500.0).values
-    truth = exact_states(setups.driven_by_forces(base, Sampled(values, 2e-3, True)), 2e-3, 250, values[:250])
+    truth = exact_states(setups.driven_by_forces(base, SampledSignal(values, 2e-3, True)), 2e-3, 250, values[:250])
     forces = StageTimeSamples(values, 2e-3, held=False)
     errors = [
         largest_magnitude(
@@ -271,7 +271,7 @@ def passed_waves_ratio(engine: str, folder: Path) -> float:
     infinite unless the stated error is a warning, and the steps that the warnings name lead to a run without a
     warning."""
     stated_run = _over_waves(engine, 2e-3, error=True)
-    name, estimate = max(errors_of(stated_run).items(), key=lambda each: each[1].share)
+    name, estimate = max(error_estimates_of(stated_run).items(), key=lambda each: each[1].share)
     cured: Estimate | None = estimate
     for _ in range(3):
         cured = largest_estimate(_over_waves(engine, cured.step, error=True)) if cured and cured.warned else cured

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
-from models.core.signals import Sampled, Signal, Smooth, Stacked
+from models.core.signals import SampledSignal, Signal, Smooth, StackedSignal
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Mode, Settings
 from models.engines.catalogue import RECOMMENDED
@@ -55,7 +55,7 @@ def guided_vehicle(base_assembly: Assembly, forces: Signal, pitch: Signal) -> As
     consistent."""
     start = base_assembly.initial.copy()
     start[[3, 7]] = pitch.at(0.0)[:2]
-    return replace(base_assembly.without_tyres().with_input("pitch", Stacked((forces, pitch))), initial=start)
+    return replace(base_assembly.without_tyres().with_input("pitch", StackedSignal((forces, pitch))), initial=start)
 
 
 def smooth_pitch(angles: np.ndarray, sample_period: float) -> Smooth:
@@ -70,12 +70,12 @@ def static_forces(
     is_held: bool = True,
     noise: float = 0.0,
     seed: int = 1,
-) -> Sampled:
+) -> SampledSignal:
     """Wheel forces (sample_count, 2) in N that carry the vehicle, with independent noise of a standard deviation (N) on
     each sample."""
     p, z = base_assembly.parameters, base_assembly.initial
     carried = np.array([p.k1 * z[0], p.k2 * z[1]])
-    return Sampled(
+    return SampledSignal(
         carried + noise * np.random.default_rng(seed).standard_normal((sample_count, 2)), sample_period, is_held
     )
 

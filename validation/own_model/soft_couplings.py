@@ -11,7 +11,7 @@ import numpy as np
 
 from models.multibody.plain.constraints import angular_velocity_jacobian
 from models.multibody.plain.motion import FIRST_DERIVATIVE
-from models.own_model.builds import Equations, Motion, plain_tree
+from models.own_model.builds import Equations, StateMotion, plain_tree
 from models.own_model.constraints import plain_constraints
 from models.own_model.equalities import coupling_rows
 from models.own_model.reading import TwinModel
@@ -26,12 +26,12 @@ def soft_constraint_equations(twin: TwinModel) -> Equations:
     tree, constraints = plain_tree(twin), plain_constraints(twin)
     give, scale = _row_compliance(twin), _row_factors(twin)
 
-    def move(q: np.ndarray, v: np.ndarray) -> Motion:
+    def move(q: np.ndarray, v: np.ndarray) -> StateMotion:
         mass, force = tree.mass_and_force(0.0, q, v)
         rows, rest = constraints.terms(q, v)
         rows, rest = scale[:, None] * rows, scale * rest
         acceleration = np.linalg.solve(mass + rows.T / give @ rows, force - rows.T / give @ rest)
-        return Motion(mass, mass @ acceleration, acceleration)
+        return StateMotion(mass, mass @ acceleration, acceleration)
 
     return move
 

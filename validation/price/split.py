@@ -22,7 +22,7 @@ from models.engines.mujoco_quiet import installed_callback
 from models.engines.reference import compiled_derivative
 from models.machine.compiled import njit
 from models.machine.stack import at, beyond
-from models.machine.timing import interleave, median
+from models.machine.timing import bootstrap_median, interleave
 from models.systems.pitch_plane.scene import assembly_of_scene
 from validation.common.rows import Observed, Row, Saved, System, Table
 from validation.price.compiled_forces import CompiledForces, force_callback
@@ -159,7 +159,7 @@ def bridge_share(timed_march: Saved) -> tuple[float, float, float]:
     """Share of the bridge between engine and forces in the time of a step, in %, with its 95 % interval (share, low,
     high)."""
     empty, cheap, real = (np.array(timed_march["seconds"][run]) for run in FORCE_VARIANTS)
-    return median(100.0 * (cheap - empty) / real)
+    return bootstrap_median(100.0 * (cheap - empty) / real)
 
 
 def rows(case_data: list[Saved]) -> list[Row]:

@@ -25,9 +25,9 @@ from models.advice.price.curves import (
     pareto,
 )
 from models.advice.price.problem import Problem, Setting
-from models.core.assumptions import collected_breaches
+from models.core.assumptions import collected_broken_assumptions
 from models.core.errors import InputError, RunFailed
-from models.machine.timing import interleave, interval, resamples
+from models.machine.timing import bootstrap_interval, bootstrap_rounds, interleave
 
 Status = Literal["ok", "raised", "refused", "flagged", "SILENT"]
 CostsAtTolerance = dict[str, ToleranceCost]
@@ -220,7 +220,7 @@ class MeasuredPoints:
             if rounds < FEWEST_ROUNDS:
                 return Loss(factor, math.nan, math.nan, usual.how)
             sides = [self._bootstrapped_seconds(side, target_error, rounds) for side in pair]
-            factor, low, high = interval(sides[0] / sides[1])
+            factor, low, high = bootstrap_interval(sides[0] / sides[1])
         return Loss(factor, low, high, usual.how)
 
     def _bootstrapped_seconds(self, bracketing: list[Point], target_error: float, round_count: int) -> np.ndarray:
@@ -229,7 +229,7 @@ class MeasuredPoints:
         """
         timed_rounds = [np.array(p.seconds)[:: len(p.seconds) // round_count][:round_count] for p in bracketing]
         medians = np.array(
-            [np.median(seconds[resamples(round_count, BOOTSTRAP_DRAWS)], axis=1) for seconds in timed_rounds]
+            [np.median(seconds[bootstrap_rounds(round_count, BOOTSTRAP_DRAWS)], axis=1) for seconds in timed_rounds]
         )
         cheapest_reaches = [self._cost_at_tolerance(bracketing, target_error, costs) for costs in medians.T]
         return np.array([cheapest.cost for cheapest in cheapest_reaches if cheapest is not None])
@@ -284,7 +284,7 @@ def attempt(problem: Problem, setting: Setting) -> Point:
     """
     start_time = PROCESSOR_CLOCK()
     try:
-        with collected_breaches() as broken:
+        with collected_broken_assumptions() as broken:
             solution = problem.build(setting).run()
             seconds, errors = PROCESSOR_CLOCK() - start_time, problem.errors(solution)
     except InputError as error:

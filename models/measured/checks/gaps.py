@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.core.finding import LISTED_FINDINGS, Finding, Weight
+from models.core.finding import LISTED_FINDINGS, Finding, FindingWeight
 from models.measured.checks.evidence import Evidence
 from models.measured.gaps import LONGEST_BRIDGED_GAP, true_runs
 from models.measured.signal import Signal
@@ -40,5 +40,5 @@ def _gap_finding(evidence: Evidence, lost: np.ndarray, signals: tuple[Signal, ..
     text = f"{short}: {lasts:.4g} s ({lengths[longest]} samples) are missing from {first:.4g} s on"
     if len(lost) > 1:
         text += f"; {len(lost) - 1} shorter gaps, {period * (lengths.sum() - lengths[longest]):.3g} s together"
-    weight: Weight = "error" if stops else "doubt"
+    weight: FindingWeight = "error" if stops else "doubt"
     return Finding(NAME, weight, ", ".join(names), f"{text}: {remedy}.", lasts, "s", names, (first, end))

@@ -15,15 +15,15 @@ from models.core.csv_header import (
     FileLine,
     TableHead,
     decimal_sign,
-    find_head,
     find_headings,
+    find_heads_above_numbers,
     is_number,
     name_and_unit,
     separator_line,
     split_cells,
 )
 from models.core.errors import InputError
-from models.core.finding import Finding, Weight
+from models.core.finding import Finding, FindingWeight
 from models.measured.formats.csv_rows import Layout
 from models.measured.formats.csv_times import find_stamps
 from models.measured.formats.opened import flaw_finding
@@ -233,7 +233,11 @@ def _table_head(path: Path, first_lines: FirstLines) -> tuple[TableHead, IsClock
     signs = (first_lines.separator,) if first_lines.separator else tuple(SEPARATORS)
     bare = [line._replace(text=line.text.strip().lstrip("# ")) for line in first_lines.comment_lines]
     every = sorted((*first_lines.lines, *bare))
-    for find, lines in ((find_head, first_lines.lines), (find_head, every), (find_headings, first_lines.lines)):
+    for find, lines in (
+        (find_heads_above_numbers, first_lines.lines),
+        (find_heads_above_numbers, every),
+        (find_headings, first_lines.lines),
+    ):
         for known in (is_clock, is_other_clock):
             heads = find(lines, known, signs)
             if len(heads) == 1:
@@ -327,7 +331,7 @@ def find_layout(
     )
     said = list[Finding]()
     for i in texts:
-        weight: Weight = "doubt" if units[i] or name_and_unit(header.names[i])[1] else "note"
+        weight: FindingWeight = "doubt" if units[i] or name_and_unit(header.names[i])[1] else "note"
         said.append(flaw_finding(path, weight, f"left out, no numbers: {header.names[i]!r}"))
     for i in nameless:
         cells = columns[i]

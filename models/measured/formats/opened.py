@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.finding import Finding, Weight
+from models.core.finding import Finding, FindingWeight
 from models.measured.channel import SAMPLES_PER_BLOCK, Channel, SampleBlock
 
 SampleSpan = tuple[int, int]
@@ -97,7 +97,7 @@ def library_errors_as_input(path: Path) -> Iterator[None]:
         raise InputError(path, "", None, f"the file is damaged and cannot be read ({why})") from error
 
 
-def flaw_finding(path: Path, weight: Weight, text: str, place: str = "") -> Finding:
+def flaw_finding(path: Path, weight: FindingWeight, text: str, place: str = "") -> Finding:
     """Finding on a flaw in a file that could be read nevertheless."""
     return Finding("file", weight, place or path.name, text)
 
@@ -145,7 +145,7 @@ def distinct_names(path: Path, names: Sequence[str], *groups: Sequence[str]) -> 
                 by_group[i] = f"{group[i]}/{name}" if group[i] else name
     unique = _number_repeated(by_group)
     for name, indices in repeated.items():
-        weight: Weight = "doubt" if any(unique[i] != by_group[i] for i in indices) else "note"
+        weight: FindingWeight = "doubt" if any(unique[i] != by_group[i] for i in indices) else "note"
         text = f"{len(indices)} channels are called {name!r}: they are read as "
         findings.append(flaw_finding(path, weight, text + ", ".join(repr(unique[i]) for i in indices), name))
     return unique, findings

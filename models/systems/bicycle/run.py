@@ -11,7 +11,7 @@ from models.bicycle.four_bodies import FALLEN_LEAN, LEAN, STEER, YAW, Ride, Y, s
 from models.bicycle.ideal_rolling import IdealBicycle
 from models.bicycle.rolling_tyres import RollingBicycle
 from models.core.assumptions import Assumption, with_assumptions
-from models.core.discretisation import Series, not_estimated, step_errors, with_stated_errors
+from models.core.discretisation import RunSeries, not_estimated, step_errors, with_stated_errors
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.engines.assembly import Settings
@@ -147,11 +147,11 @@ def _with_step_error(run: Result, scene: BicycleScene) -> Result:
         ride.steps, scene.run.step
     )  # in steps of any length: rows of longer ones are among these rows
 
-    def series(ride: Ride) -> Series:
+    def series(ride: Ride) -> RunSeries:
         columns = {name: ride.positions[:, list(COORDINATES).index(name)] for name in CHANNELS_WITH_ERROR}
-        return Series(ride.times, {name: values for name, values in columns.items() if np.abs(values).max() > 1e-12})
+        return RunSeries(ride.times, {name: values for name, values in columns.items() if np.abs(values).max() > 1e-12})
 
-    def rerun(factor: float, share: float) -> Series:
+    def rerun(factor: float, share: float) -> RunSeries:
         step = factor * scene.run.step
         step_count = int(share * duration / step * (1.0 + 1e-9))
         if factor > 1.0 and step_count < 2 * stride:

@@ -12,7 +12,7 @@ from pydantic import Field
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN
 from models.contact.material import STEEL, Falling, Material, MaterialPair
 from models.core.errors import InputError
-from models.core.scene_effects import check, with_effect_tables
+from models.core.scene_effects import check_effects, with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict, quantity
 
@@ -204,7 +204,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Co
         scene, _geometry_refusals, _contact_refusals, _size_refusals, _sweep_refusals, _method_refusals
     )
     complete = with_effect_tables(scene)
-    check(complete)
+    check_effects(complete)
     _raise_first_refusal(scene, _friction_refusals)
     return complete
 

@@ -23,7 +23,7 @@ from models.core.assumptions import with_assumptions
 from models.core.discretisation import finite_rms, grid_error, with_stated_errors
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
-from models.machine.seconds import cost
+from models.machine.seconds import seconds_text
 from models.systems.contact.assumptions import pressing_assumptions
 from models.systems.contact.run import Progress, hertz_of, interpenetrating, scene_contact
 from models.systems.contact.scene import ContactScene
@@ -324,5 +324,5 @@ def cheapest_lines(points: list[TheoryPoint]) -> list[tuple[str, ...]]:
 def _point_text(point: TheoryPoint | None, error: Callable[[TheoryPoint], float]) -> str:
     if point is None:
         return "none"
-    seconds = cost((point.seconds, *point.range))
+    seconds = seconds_text((point.seconds, *point.range))
     return f"{point.name}, {point.cells} cells: {seconds} ({100 * error(point):.2g} %)"

@@ -12,7 +12,7 @@ import numpy as np
 from models.core.assumptions import with_assumptions
 from models.core.discretisation import (
     Estimate,
-    Series,
+    RunSeries,
     grid_error,
     not_estimated,
     reference_size,
@@ -203,7 +203,7 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
         for name, values in fine.channels.items()
         if np.abs(values).max() > still.get(UNIT_OF_CHANNEL[name], STANDSTILL_SHARE * speed)
     }
-    by_step, method_text = step_errors(Series(fine.times, moving), rerun, STEP_ERROR_ORDER, rerun.step)
+    by_step, method_text = step_errors(RunSeries(fine.times, moving), rerun, STEP_ERROR_ORDER, rerun.step)
     by_net = rerun.by_cells(list(moving))
     estimates = {
         name: replace(summed_error(by_step[name], by_net[name]), unit=UNIT_OF_CHANNEL[name]) for name in moving
@@ -227,11 +227,11 @@ class ManoeuvreRerun:
         return float(self.drive.run.times[1])
 
     @cached_property
-    def in_double_step(self) -> Series:
+    def in_double_step(self) -> RunSeries:
         """Time series of the manoeuvre in twice the time step; raises RunFailed."""
         return self._series_on_cells(self.drive.handling.tyres.cells, 2.0)
 
-    def _series_on_cells(self, cells: int, factor: float) -> Series:
+    def _series_on_cells(self, cells: int, factor: float) -> RunSeries:
         handling, steps = self.drive.handling, int((len(self.drive.run.times) - 1) / factor)
         changed = handling.changed(tyres=replace(handling.tyres, cells=cells))
         step = factor * self.step
@@ -239,7 +239,7 @@ class ManoeuvreRerun:
             raise RunFailed(self.engine, f"a step of {step:g} s outlasts the manoeuvre")
         return principal_series(drive_run(self.engine, changed, self.speed, steps * step, step))
 
-    def __call__(self, factor: float, share: float) -> Series:
+    def __call__(self, factor: float, share: float) -> RunSeries:
         """Repeat the manoeuvre in twice the time step, or a share of it in half the step; returns its time series (see
         ``models.core.discretisation.Rerun``)."""
         if factor > 2.0:
@@ -294,10 +294,10 @@ class ManoeuvreRerun:
         return report[:, :, [at.FX, at.FY]]
 
 
-def principal_series(drive: Drive, start_time: float = 0.0) -> Series:
+def principal_series(drive: Drive, start_time: float = 0.0) -> RunSeries:
     """Time series of the channels whose error is estimated, for a drive that begins at ``start_time`` (s)."""
     motion = dict(zip(UNIT_OF_CHANNEL, drive.velocity().T, strict=False))
-    return Series(
+    return RunSeries(
         start_time + drive.run.times, motion | {name: drive[name] for name in UNIT_OF_CHANNEL if name in TYRE_CHANNELS}
     )
 

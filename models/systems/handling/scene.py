@@ -11,7 +11,7 @@ from pydantic import Field, PrivateAttr
 from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects, with_effect_tables
 from models.core.scene_file import SceneFile, checked
-from models.core.steps import MOST_STEPS, divides, dividing_step
+from models.core.steps import MOST_STEPS, dividing_step, step_divides
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.engines.assembly import Settings
 from models.engines.error_control import AdaptiveEngineTable, check_engines
@@ -229,7 +229,7 @@ def _measured_manoeuvre(scene: HandlingScene, name: str, manoeuvre: Manoeuvre) -
         if getattr(manoeuvre, control) != NO_CONTROL:
             raise InputError(file, f"{key_path}.{control}", None, "cannot go with a measured drive, which has its own")
     period = float(drive.times[1] - drive.times[0])
-    if not divides(scene.run.step, period):
+    if not step_divides(scene.run.step, period):
         raise InputError(
             file, "run.step", scene.run.step, f"must divide {period:g} s, the clock of {key_path}.measured"
         )
@@ -246,7 +246,7 @@ def _check_times(scene: HandlingScene, key_path: str, manoeuvre: Manoeuvre) -> N
     if duration / step > MOST_STEPS:
         allowed = f"needs {duration / step:.3g} steps; at most {MOST_STEPS:,} are possible"
         raise InputError(scene.file, f"{key_path}.duration", duration, allowed)
-    if not divides(step, duration):
+    if not step_divides(step, duration):
         allowed = f"must divide {key_path}.duration = {duration:g} s; use for example {dividing_step(step, duration)}"
         raise InputError(scene.file, "run.step", step, allowed)
 

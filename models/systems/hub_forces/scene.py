@@ -13,7 +13,7 @@ from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects, with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.signals import Interpolation
-from models.core.steps import divides, dividing_step
+from models.core.steps import dividing_step, step_divides
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.core.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
 from models.core.time_series import CHASSIS_SAMPLE_TIME, read_time_series, wrong_time_unit_hint
@@ -188,7 +188,7 @@ class HubScene(SceneFile):
         if last_time < self.run.duration * (1 - 1e-9):
             allowed = f"the files end at {last_time:g} s{wrong_time_unit_hint(last_time, self.run.duration)}"
             raise InputError(self.file, "run.duration", self.run.duration, allowed)
-        if self.forces.interpolation == "held" and not divides(self.run.step, period):
+        if self.forces.interpolation == "held" and not step_divides(self.run.step, period):
             allowed = f"must divide the period of {period:g} s over which samples are held"
             raise InputError(self.file, "run.step", self.run.step, allowed)
         count = round(self.run.duration / period) + 1
@@ -227,10 +227,10 @@ def _check_file_only(file: str, scene: HubScene) -> None:
 
 def _check_steps(file: str, scene: HubScene) -> None:
     step, duration = scene.run.step, scene.run.duration
-    if not divides(step, duration):
+    if not step_divides(step, duration):
         allowed = f"must divide run.duration = {duration:g} s, as {dividing_step(step, duration)} s does"
         raise InputError(file, "run.step", step, allowed)
     period = 1.0 / scene.forces.sampling_rate
-    if scene.road is not None and not (divides(step, period) and divides(period, duration)):
+    if scene.road is not None and not (step_divides(step, period) and step_divides(period, duration)):
         allowed = f"its period must be a multiple of run.step = {step:g} s and divide run.duration = {duration:g} s"
         raise InputError(file, "forces.sampling_rate", scene.forces.sampling_rate, allowed)

@@ -21,7 +21,7 @@ from models.core.finding import Finding
 from models.core.whole_files import write_whole
 from models.engines.cut_vehicle import TUMBLED_PITCH, HubModel, build, check_step
 from models.engines.protocol import SIZE_BOUND
-from models.machine.compiled import checksum
+from models.machine.compiled import folder_checksum
 from models.measured.columns import Columns
 from models.measured.recording import Recording, no_progress
 from models.multibody.cut_table import HubInputs, cut_vehicle_table
@@ -335,7 +335,9 @@ class _March:
 def _inputs_of(job: SectionRun, inputs: Inputs) -> dict[str, str]:
     """Checksums of all inputs on which a run's results depend, by names that users understand."""
     library = {"reference": "numpy"}.get(job.engine, job.engine)
-    sources = [checksum(Path(__file__).parents[2] / folder) for folder in ("multibody", "systems/measured", "measured")]
+    sources = [
+        folder_checksum(Path(__file__).parents[2] / folder) for folder in ("multibody", "systems/measured", "measured")
+    ]
     idle = HubInputs(np.zeros((1, 6 * len(inputs.hubs))))
     samples = digest_of(job.recording.period, job.recording.count)
     for signal in inputs.used_signals:

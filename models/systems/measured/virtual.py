@@ -11,7 +11,7 @@ from pydantic import Field
 
 from models.core.discretisation import Estimate
 from models.core.errors import InputError
-from models.core.steps import divides, dividing_step
+from models.core.steps import dividing_step, step_divides
 from models.core.strict import Strict, quantity
 from models.core.whole_files import write_whole
 from models.engines.assembly import Settings
@@ -129,10 +129,10 @@ def check(vehicle: CutVehicle, virtual: VirtualTable, file: str = "") -> tuple[S
     another, and for names that the vehicle does not have.
     """
     period, divides_text = 1.0 / virtual.sampling_rate, f"divide virtual.duration = {virtual.duration:g} s"
-    if not divides(virtual.step, virtual.duration):
+    if not step_divides(virtual.step, virtual.duration):
         allowed = f"must {divides_text}, as {dividing_step(virtual.step, virtual.duration)} s does"
         raise InputError(file, "virtual.step", virtual.step, allowed)
-    if not (divides(virtual.step, period) and divides(period, virtual.duration)):
+    if not (step_divides(virtual.step, period) and step_divides(period, virtual.duration)):
         allowed = f"its period must be a multiple of virtual.step = {virtual.step:g} s and {divides_text}"
         raise InputError(file, "virtual.sampling_rate", virtual.sampling_rate, allowed)
     known = tuple(element.name for element in vehicle.elements)

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
-from models.core.scene_effects import module_of
-from models.core.steps import divides
+from models.core.scene_effects import effect_of
+from models.core.steps import step_divides
 from models.core.systems import DEFAULT_SYSTEM
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
@@ -60,7 +60,7 @@ class NoisePaths:
         assembly = self.base
         for name, p in self.path_effects:
             with_path = p.model_copy(update={"path": path}) if "path" in type(p).model_fields else p
-            assembly = module_of(DEFAULT_SYSTEM, name).extend(assembly, with_path)
+            assembly = effect_of(DEFAULT_SYSTEM, name).extend(assembly, with_path)
         return assembly
 
     def trajectory(self, path: int) -> Trajectory:
@@ -149,7 +149,7 @@ def _shared_and_path_effects(scene: Scene) -> tuple[Assembly, tuple[tuple[str, A
     """Returns the assembly that all paths share, and the effects that have a path or depend on such an effect."""
     names, unshared = effects_in_order(scene), list[str]()
     for name in names:
-        module = module_of(DEFAULT_SYSTEM, name)
+        module = effect_of(DEFAULT_SYSTEM, name)
         if "path" in type(scene.effects[name]).model_fields or set(unshared) & {*module.NEEDS, *module.AFTER}:
             unshared.append(name)
     shared = scene.model_copy(update={"effects": {name: scene.effects[name] for name in names if name not in unshared}})
@@ -159,7 +159,7 @@ def _shared_and_path_effects(scene: Scene) -> tuple[Assembly, tuple[tuple[str, A
 def _step_rows(scene: Scene, settings: Settings, times: np.ndarray) -> np.ndarray:
     """Numbers of the time steps at requested times (s); raises InputError for a time between steps."""
     for time in times:
-        if not 0 <= time <= settings.duration * (1 + 1e-9) or (time > 0 and not divides(settings.step, time)):
+        if not 0 <= time <= settings.duration * (1 + 1e-9) or (time > 0 and not step_divides(settings.step, time)):
             allowed = f"must lie between 0 and {settings.duration:g} s, on a multiple of the step {settings.step:g} s"
             raise InputError(scene.file, "times", float(time), allowed)
     return np.rint(np.asarray(times) / settings.step).astype(np.int64)

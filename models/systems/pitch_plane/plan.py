@@ -4,7 +4,7 @@ from models.core.assumptions import assumption_lines
 from models.core.errors import Refused
 from models.core.finding import Finding
 from models.core.scene_effects import effect_lines as effect_lines
-from models.core.scene_effects import module_of
+from models.core.scene_effects import effect_of
 from models.core.systems import DEFAULT_SYSTEM
 from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
@@ -92,7 +92,7 @@ def _channel_lines(assembly: Assembly) -> list[str]:
     names += ["zeta1", "zeta2"] if assembly.mode == "road" else []
     names += ["enforced_force"] if assembly.mode == "heave-pitch" else []
     names += ["inertia_term", "enforced_moment"] if assembly.guided else []
-    return names + [channel for name in assembly.scene.effects for channel in module_of(DEFAULT_SYSTEM, name).CHANNELS]
+    return names + [channel for name in assembly.scene.effects for channel in effect_of(DEFAULT_SYSTEM, name).CHANNELS]
 
 
 def trust_line(assembly: Assembly) -> list[str]:

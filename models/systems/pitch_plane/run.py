@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import FINE_WINDOW, Series, reference_size, with_estimated_errors, with_tolerance_error
+from models.core.discretisation import (
+    FINE_WINDOW,
+    RunSeries,
+    reference_size,
+    with_estimated_errors,
+    with_tolerance_error,
+)
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
@@ -91,7 +97,7 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
     fine, sizes = _series_of_run(run.detail.times, channels, names), _enforced_sizes(assembly, channels)
     method = CATALOGUE[engine][settings.integrator]
 
-    def rerun(changed: Settings) -> Series:
+    def rerun(changed: Settings) -> RunSeries:
         trajectory = build(engine, assembly, changed).run()
         return _series_of_run(trajectory.times, output_channels(replace(assembly, sensors=()), trajectory), names)
 
@@ -99,7 +105,7 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
         looser = _with_longer_engine_step(rerun, replace(settings, tolerance=TOLERANCE_FACTOR * settings.tolerance))
         return with_tolerance_error(run, fine, looser, TOLERANCE_FACTOR, settings.tolerance, sizes)
 
-    def longer(step_factor: float, share: float) -> Series:
+    def longer(step_factor: float, share: float) -> RunSeries:
         return rerun(_settings_of_longer_step(settings, step_factor, share))
 
     return with_estimated_errors(
@@ -107,7 +113,7 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
     )
 
 
-def _with_longer_engine_step(rerun: Callable[[Settings], Series], settings: Settings) -> Series:
+def _with_longer_engine_step(rerun: Callable[[Settings], RunSeries], settings: Settings) -> RunSeries:
     """Repeats a run with the engine's longest step doubled as well, where the input allows it: this step may dominate
     the error.
     """
@@ -117,8 +123,8 @@ def _with_longer_engine_step(rerun: Callable[[Settings], Series], settings: Sett
         return rerun(settings)
 
 
-def _series_of_run(times: np.ndarray, channels: Channels, names: tuple[str, ...]) -> Series:
-    return Series(times, {name: channels[name][2] for name in names})
+def _series_of_run(times: np.ndarray, channels: Channels, names: tuple[str, ...]) -> RunSeries:
+    return RunSeries(times, {name: channels[name][2] for name in names})
 
 
 def _enforced_sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:

@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.scene_effects import check_combination, module_of, read_tables
-from models.core.scene_file import SceneFile, checked, existing_file, parse
-from models.core.steps import MOST_STEPS, divides, dividing_step
+from models.core.scene_effects import check_combination, effect_of, read_tables
+from models.core.scene_file import SceneFile, checked, existing_file, parse_toml
+from models.core.steps import MOST_STEPS, dividing_step, step_divides
 from models.core.strict import Query, Strict, accepted_queries_field, quantity, read
 from models.core.systems import DEFAULT_SYSTEM
 from models.engines.assembly import Assembly, Settings
@@ -98,7 +98,7 @@ def parameter_set(name: str, file: str, folder: Path) -> pitch_plane.PitchPlaneP
     """A published parameter set by its name, or the user's own from a TOML file."""
     if name.endswith(".toml"):
         return read(
-            pitch_plane.PitchPlaneParameters, parse(existing_file(name, folder, file, "vehicle.parameters")), name
+            pitch_plane.PitchPlaneParameters, parse_toml(existing_file(name, folder, file, "vehicle.parameters")), name
         )
     if name not in parameter_sets():
         allowed = "must be a TOML file with all parameters, or a published set"
@@ -199,10 +199,10 @@ def _check_step(scene: Scene, key_path: str, step: float) -> None:
     if length / step > MOST_STEPS:
         allowed = f"needs {length / step:.3g} steps of {key_path} = {step:g} s; at most {MOST_STEPS:,} are possible"
         raise InputError(scene.file, "run.duration", length, allowed)
-    if not divides(step, length):
+    if not step_divides(step, length):
         allowed = f"must divide run.duration = {length:g} s; use for example {dividing_step(step, length)}"
         raise InputError(scene.file, key_path, step, allowed)
-    if wanted is not None and not divides(step, wanted):
+    if wanted is not None and not step_divides(step, wanted):
         allowed = f"must be a multiple of {key_path} = {step:g} s"
         raise InputError(scene.file, "run.output_step", wanted, allowed)
 
@@ -224,7 +224,7 @@ def assembly_of_scene(scene: Scene) -> Assembly:
     vehicle = pitch_plane.pitch_plane_vehicle(p, scene.vehicle.geometry)
     assembly = Assembly(scene, vehicle, p, "free", None, _initial_state(scene, p))
     for name in effects_in_order(scene):
-        assembly = module_of(DEFAULT_SYSTEM, name).extend(assembly, scene.effects[name])
+        assembly = effect_of(DEFAULT_SYSTEM, name).extend(assembly, scene.effects[name])
     return assembly
 
 
@@ -242,7 +242,7 @@ def effects_in_order(scene: Scene) -> list[str]:
     """Returns the names of the scene's effects, each after the effects that it needs. Raises InputError for effects
     that exclude one another.
     """
-    modules = {name: module_of(DEFAULT_SYSTEM, name) for name in scene.effects}
+    modules = {name: effect_of(DEFAULT_SYSTEM, name) for name in scene.effects}
     check_combination(modules, scene)
     ordered_effects: list[str] = []
     waiting = list(modules)

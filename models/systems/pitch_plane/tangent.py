@@ -20,10 +20,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
-from models.core.signals import Sampled, Smooth
+from models.core.signals import SampledSignal, Smooth
 from models.engines.assembly import Assembly
 from models.engines.reference import compiled_closure
-from models.machine.compiled import named_closure
+from models.machine.compiled import closure_with_unique_name
 from models.vehicles.pitch_plane import STATES, PitchPlaneParameters
 from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, suspension_forces
 
@@ -117,7 +117,7 @@ def _step_of(rhs, body, flat):
             for j in range(columns):
                 x[j, q] += step / 6 * (kx[0, j, q] + 2 * kx[1, j, q] + 2 * kx[2, j, q] + kx[3, j, q])
 
-    return register_jitable(named_closure(step_of, rhs.__name__, body, flat))
+    return register_jitable(closure_with_unique_name(step_of, rhs.__name__, body, flat))
 
 
 def compile_carry(one_step, key):
@@ -147,7 +147,7 @@ class TangentPath:
     """
 
     assembly: Assembly
-    forces: Sampled | Smooth
+    forces: SampledSignal | Smooth
     per_sample: int
     samples: int
 
@@ -215,7 +215,7 @@ def path_of(assembly: Assembly, longest_step: float = LONGEST_STEP) -> TangentPa
     """
     forces = assembly.input
     held_up = assembly.vehicle.pitch_springs or assembly.moment is not None
-    if assembly.mode not in ("force", "force-body") or held_up or not isinstance(forces, Sampled | Smooth):
+    if assembly.mode not in ("force", "force-body") or held_up or not isinstance(forces, SampledSignal | Smooth):
         raise ValueError("errors grow along a free force-excited run; this one is guided or held, or has a road")
     samples = round(assembly.scene.run.duration / forces.period)
     return TangentPath(assembly, forces, max(1, math.ceil(forces.period / longest_step - 1e-9)), samples)

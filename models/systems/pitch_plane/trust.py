@@ -15,7 +15,7 @@ import numpy as np
 
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
-from models.core.signals import Sampled, Smooth
+from models.core.signals import SampledSignal, Smooth
 from models.drift.growth import (
     MEDIAN_OF_NORMAL,
     growth_rate,
@@ -212,7 +212,7 @@ def predict_trust(assembly: Assembly, angle: float = UNTRUSTED_PITCH) -> Trust |
         path_of(assembly)
     except ValueError:
         return None
-    assert isinstance(forces, Sampled | Smooth)
+    assert isinstance(forces, SampledSignal | Smooth)
     times_of_causes = {"interpolation between the samples": interpolation_error_curve(assembly).passing_time(angle)}
     added = assembly.scene.effects.get("force_noise")
     if added is not None and added.deviation > 0:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import eigh
 
-from models.core.assumptions import Assumption, Gaussian, Watched
+from models.core.assumptions import Assumption, GaussianValues, Watched
 from models.core.result import Result
 from models.systems.ride.scene import RideScene
 from models.systems.ride.watched import AXES, GRAVITY, WatchedMotion, static_loads
@@ -47,7 +47,7 @@ def assumptions(
     replaced : whether statistical linearisation replaces nonlinear springs by gains.
     """
 
-    def values_of(name: str) -> np.ndarray | Gaussian:
+    def values_of(name: str) -> np.ndarray | GaussianValues:
         assert motion is not None
         return motion.motion_of_part(name)
 
@@ -66,7 +66,7 @@ def assumptions(
     return [*assumptions_of_vehicle, *([NEARLY_GAUSSIAN] if replaced else [])]
 
 
-ValuesByName = Callable[[str], np.ndarray | Gaussian]
+ValuesByName = Callable[[str], np.ndarray | GaussianValues]
 
 
 def _tyre_assumptions(vehicle: SpatialVehicle, values_of: ValuesByName) -> Iterator[Assumption]:
@@ -81,8 +81,10 @@ def _tyre_assumptions(vehicle: SpatialVehicle, values_of: ValuesByName) -> Itera
     yield Assumption("tyres press", "linear tyres stay on the road", remedy, watched, "N", lower_limit=-PULL_LIMIT)
 
 
-def _with_static_load(values: np.ndarray | Gaussian, static_load: float) -> np.ndarray | Gaussian:
-    return replace(values, mean=values.mean + static_load) if isinstance(values, Gaussian) else values + static_load
+def _with_static_load(values: np.ndarray | GaussianValues, static_load: float) -> np.ndarray | GaussianValues:
+    return (
+        replace(values, mean=values.mean + static_load) if isinstance(values, GaussianValues) else values + static_load
+    )
 
 
 def _angle_assumptions(vehicle: SpatialVehicle, values_of: ValuesByName) -> Iterator[Assumption]:
@@ -235,7 +237,7 @@ def _seat_assumptions(scene: RideScene) -> Iterator[Assumption]:
             deviation = deviation[0]
         rows = [f"at {speed:g} m/s" for speed in run["speed"]] if "speed" in run.data.coords else []
         deviations = {name: deviation[:, outputs.index(name)] for name in people if name in outputs}
-        return {name: Gaussian(np.zeros(len(values)), values, rows) for name, values in deviations.items()}
+        return {name: GaussianValues(np.zeros(len(values)), values, rows) for name, values in deviations.items()}
 
     yield Assumption(
         "people stay seated",

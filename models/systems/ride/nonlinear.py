@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import Series, with_estimated_errors
+from models.core.discretisation import RunSeries, with_estimated_errors
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity
 from models.core.trajectory import Trajectory
@@ -275,11 +275,13 @@ def _with_error_of_steps(
     steps = len(table) // 2
     first = STEPS_BETWEEN_ROWS * int(min(skipped / path.step, FIRST_ROW_SHARE * steps) / STEPS_BETWEEN_ROWS)
 
-    def series(ride: Ride, begin_time: float) -> Series:
+    def series(ride: Ride, begin_time: float) -> RunSeries:
         known = ~np.isnan(ride.outputs).any(axis=0)
-        return Series(begin_time + ride.times, {name: ride.outputs[:, i] for i, name in enumerate(names) if known[i]})
+        return RunSeries(
+            begin_time + ride.times, {name: ride.outputs[:, i] for i, name in enumerate(names) if known[i]}
+        )
 
-    def rerun(step_factor: float, share: float) -> Series:
+    def rerun(step_factor: float, share: float) -> RunSeries:
         longer, stride = (
             replace(path, half_step=step_factor * path.half_step),
             max(1, round(STEPS_BETWEEN_ROWS / step_factor) if step_factor <= 2.0 else 8),

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from models.core.scene_effects import module_of, tables_of
+from models.core.scene_effects import effect_of, effect_tables_of
 from models.systems.ride.reduced_scene import Effect, ReducedScene
 from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import Freedom, SpatialVehicle, SpringDamper
@@ -34,7 +34,7 @@ def effects_of(scene: ReducedScene) -> tuple[Effect, ...]:
     names of their kinds.
     """
     system = scene.ride.system
-    tables = {name: module_of(system, name) for name in tables_of(scene.ride)}
+    tables = {name: effect_of(system, name) for name in effect_tables_of(scene.ride)}
     effects = {name: find(scene) for name, find in EFFECTS_BY_KIND.items()}
     effects |= {
         name: [Effect(name, partial(_without_table, name=name), table.COST, is_singular=True, has_table=True)]

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from models.core.assumptions import Gaussian
+from models.core.assumptions import GaussianValues
 from models.core.errors import InputError
 from models.ride.sweep import variance_sweep
 from models.road.excitation import Excitation
@@ -27,7 +27,7 @@ JUDGED_SPEEDS = 5
 class WatchedMotion(Protocol):
     """Protocol of the motion of a vehicle's parts in a run; motions have the names of ``watched_outputs``."""
 
-    def motion_of_part(self, name: str) -> np.ndarray | Gaussian:
+    def motion_of_part(self, name: str) -> np.ndarray | GaussianValues:
         """Returns the values of a part's motion at every row of the run, or its Gaussian statistics."""
         ...
 
@@ -96,10 +96,10 @@ class Spectral:
     speeds: Sequence[float]
     means: Mapping[str, np.ndarray]
 
-    def motion_of_part(self, name: str) -> Gaussian:
+    def motion_of_part(self, name: str) -> GaussianValues:
         """Returns the Gaussian statistics of a part's motion at every speed."""
         mean = self.means.get(name, np.zeros(len(self.speeds)))
-        return Gaussian(mean, self._deviations[name], [f"at {speed:g} m/s" for speed in self.speeds])
+        return GaussianValues(mean, self._deviations[name], [f"at {speed:g} m/s" for speed in self.speeds])
 
     @cached_property
     def _deviations(self) -> dict[str, np.ndarray]:
@@ -125,11 +125,11 @@ class MotionAlongDrive:
     deviations: Mapping[str, np.ndarray]
     speed_by_speed: Spectral
 
-    def motion_of_part(self, name: str) -> Gaussian:
+    def motion_of_part(self, name: str) -> GaussianValues:
         """Returns the Gaussian statistics of a part's motion at every instant of the drive, or at some speeds."""
         if name in self.deviations:
             deviation = self.deviations[name]
-            return Gaussian(np.zeros(len(deviation)), deviation)
+            return GaussianValues(np.zeros(len(deviation)), deviation)
         return self.speed_by_speed.motion_of_part(name)
 
 

@@ -15,7 +15,7 @@ from models.contact.accuracy import LIKELY_SHARE, coarser_cells
 from models.core.discretisation import (
     FINE_WINDOW,
     Estimate,
-    Series,
+    RunSeries,
     grid_error,
     nearest_rows,
     not_estimated,
@@ -78,17 +78,17 @@ def with_error(run: Result, scene: WheelsetScene, march_scene: March) -> Result:
     return with_stated_errors(run, estimates, f"a path on {other_cells} cells and some steps of other length")
 
 
-def principal_series(path: WheelsetPath) -> Series:
+def principal_series(path: WheelsetPath) -> RunSeries:
     """Time series of the channels whose error is stated: lateral displacement (m), yaw (rad), and creep forces (N) of
     each wheel.
     """
     forces = {
         name: np.stack([*sums_by_wheel(path.contacts, path.contacts[name]).values()], axis=1) for name in ("fx", "fy")
     }
-    return Series(path.times, {"y": path.states[:, Y], "yaw": path.states[:, YAW], **forces})
+    return RunSeries(path.times, {"y": path.states[:, Y], "yaw": path.states[:, YAW], **forces})
 
 
-def _channel_sizes(fine_series: Series, load: float) -> dict[str, float]:
+def _channel_sizes(fine_series: RunSeries, load: float) -> dict[str, float]:
     """Sizes of the channels, by which relative errors are divided; ``load`` : largest load of a patch (N)."""
     return {
         name: max(reference_size(values), ROUNDING_SIZE * (load if UNIT_OF_CHANNEL[name] == "N" else 1.0))
@@ -111,7 +111,7 @@ def with_step_factor(
     return scene.model_copy(update={"contact": contact, "run": run})
 
 
-def _coarse_series(scene: WheelsetScene, march_scene: March, cells: int) -> Series:
+def _coarse_series(scene: WheelsetScene, march_scene: March, cells: int) -> RunSeries:
     """Time series of the path on another number of cells, in twice the time step where this is possible."""
     with suppress(InputError, RunFailed):
         return principal_series(march_scene(with_step_factor(scene, 2.0, cells=cells)))
@@ -121,8 +121,8 @@ def _coarse_series(scene: WheelsetScene, march_scene: March, cells: int) -> Seri
 def _step_errors(
     scene: WheelsetScene,
     march_scene: March,
-    fine_series: Series,
-    coarse_series: Series,
+    fine_series: RunSeries,
+    coarse_series: RunSeries,
     channel_sizes: Mapping[str, float],
 ) -> dict[str, Estimate]:
     """Errors of the time steps over the whole path. They are measured over its first part, and enlarged as the errors
@@ -150,7 +150,7 @@ def _step_errors(
     return estimates
 
 
-def _rms_difference(fine_series: Series, other_series: Series, name: str, end_time: float = math.inf) -> float:
+def _rms_difference(fine_series: RunSeries, other_series: RunSeries, name: str, end_time: float = math.inf) -> float:
     """Root mean square of the difference of a channel between two series, up to a time (s), at the times of the coarser
     one.
     """

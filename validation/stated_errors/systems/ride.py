@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from control import lyap
 
-from models.core.discretisation import Estimate, errors_of
+from models.core.discretisation import Estimate, error_estimates_of
 from models.core.errors import RunFailed
 from models.core.result import Result
 from models.ride.covariance import noise_arrivals
@@ -67,7 +67,9 @@ def _varied_vehicle(generator: np.random.Generator, vehicle: SpatialVehicle) -> 
 def _sample_of(
     result: Result, name: str, engine: str, true_errors: Mapping[str, float], calls: float, extra_calls: float
 ) -> Sample:
-    estimates = {channel: estimate for channel, estimate in errors_of(result).items() if channel in true_errors}
+    estimates = {
+        channel: estimate for channel, estimate in error_estimates_of(result).items() if channel in true_errors
+    }
     return Sample(name, engine, estimates, true_errors, calls, extra_calls)
 
 
@@ -174,7 +176,7 @@ def _sample_of_copies(generator: np.random.Generator, sample_number: int) -> Sam
     for i, (name, gains) in enumerate(zip(run.names, result["deviation"][0], strict=True)):
         for method_name, value in (("copies", run.deviation[i]), ("gains", gains)):
             channel = f"{name}, {method_name}"
-            estimate = errors_of(result)[channel]
+            estimate = error_estimates_of(result)[channel]
             chance_part = chance.get(channel, {"error": 0.0, "share": 0.0})
             error, share = (
                 np.hypot(estimate.error, chance_part["error"]),

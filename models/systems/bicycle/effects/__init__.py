@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from models.core.scene_effects import Entry, Table
+from models.core.scene_effects import EffectEntry, Table
 
 
-def _control_effect(key: str, neutral: float, usual_value: float, description: str, **entry_fields: Any) -> Entry:
+def _control_effect(key: str, neutral: float, usual_value: float, description: str, **entry_fields: Any) -> EffectEntry:
     """Returns an effect that is present where a key of [control] has a value other than ``neutral``.
 
     usual_value : value of the key when the effect is added to a scene.
@@ -21,7 +21,7 @@ def _control_effect(key: str, neutral: float, usual_value: float, description: s
         table.setdefault("control", {})[key] = usual_value
 
     cost = "a product per call"
-    return Entry(
+    return EffectEntry(
         description, f"control.{key}", cost, is_present=is_present, leave_out=leave_out, put_in=put_in, **entry_fields
     )
 

@@ -7,7 +7,7 @@ controllers in the loop.
 
 from typing import Any
 
-from models.core.scene_effects import Entry, Table
+from models.core.scene_effects import EffectEntry, Table
 from models.systems.handling.effects import without_trailer
 
 AXLE_KEYS = ("front", "rear", "trailer")
@@ -22,7 +22,7 @@ def _differs_from_default(table: Any, keys: tuple[str, ...]) -> bool:
 
 def _sensor_effect(
     signal_kind: str, keys: tuple[str, ...], description: str, cost: str, count_name: str, usual_value: dict[str, float]
-) -> Entry:
+) -> EffectEntry:
     """Returns an effect of sensors at the port, present where keys of [port.signals] or [port.pressures] differ from
     those of a perfect sensor.
     """
@@ -39,7 +39,7 @@ def _sensor_effect(
 
     counts = {"asked": 1, count_name: 4}
     key_path = f"port.{signal_kind}.{keys[0]}"
-    return Entry(
+    return EffectEntry(
         description, key_path, cost, counts, ("port",), is_present=is_present, leave_out=leave_out, put_in=put_in
     )
 
@@ -52,7 +52,7 @@ def _brake_effect(
     cost: str,
     count_name: str,
     usual_value: Any,
-) -> Entry:
+) -> EffectEntry:
     """Returns an effect of the brakes, present where keys of [brakes.AXLE] differ from their defaults. Leaving it out
     removes ``removed_keys``; putting it in updates the front and rear tables by ``usual_value(axle, brake)``.
     """
@@ -71,7 +71,7 @@ def _brake_effect(
             brake = table.setdefault("brakes", {}).setdefault(axle, plain)
             brake.update(usual_value(axle, brake))
 
-    return Entry(
+    return EffectEntry(
         description, key_path, cost, {count_name: 4}, is_present=is_present, leave_out=leave_out, put_in=put_in
     )
 
@@ -149,7 +149,7 @@ def _tows_bodies(scene: Any) -> bool:
 
 MEASURED_PRESSURES_KEY, SUSPENSION_KEY = ("measured_pressures",), ("suspension",)
 TABLE = {
-    "anti_lock": Entry(
+    "anti_lock": EffectEntry(
         "A controller that opens and closes the valves of every wheel",
         "controller",
         "one answer of the controller per sample",
@@ -159,7 +159,7 @@ TABLE = {
         usual_value={"kind": "slip_bang_bang"},
         is_present=lambda scene: scene.controller.kind != "none",
     ),
-    "faults": Entry(
+    "faults": EffectEntry(
         "Lost, delayed or wrong samples, and valves that are stuck, on demand",
         "port.faults",
         "one look at each fault per sample",
@@ -177,7 +177,7 @@ TABLE = {
         "loops",
         lambda axle, brake: {"falling": 1.1 * brake["gradient"]},  # chosen
     ),
-    "load_transfer": Entry(
+    "load_transfer": EffectEntry(
         "Loads that move between the wheels with the accelerations of the body, semi-static",
         "load_transfer",
         "two products per wheel and step",
@@ -186,13 +186,13 @@ TABLE = {
         why="whose springs carry the loads",
         usual_value={},
     ),
-    "measured_pressures": Entry(
+    "measured_pressures": EffectEntry(
         "Pressures from a file in place of pedal and controller",
         "measured",
         "a row of a table per sample",
         {"files": 1},
     ),
-    "port": Entry(
+    "port": EffectEntry(
         "A port between vehicle and controller, each exchange checked, behind which anything may stand",
         "port",
         "one exchange per sample, and what stands behind it",
@@ -209,7 +209,7 @@ TABLE = {
         "wrong signals",
         {"gain": 1.01},
     ),
-    "pressure_dynamics": Entry(
+    "pressure_dynamics": EffectEntry(
         "Chambers that fill and empty with time constants behind their valves",
         "pressure",
         "two exponentials per wheel and sample",
@@ -243,14 +243,14 @@ TABLE = {
         "push-outs",
         lambda axle, brake: {"push_out": 0.75 if axle == "front" else 0.25},  # of the paper's brakes
     ),
-    "rear_tyres": Entry(
+    "rear_tyres": EffectEntry(
         "Rear tyres with figures of their own",
         "tyres.own_rear",
         "a second table of friction per surface",
         {"tables": 1},
         usual_value=True,
     ),
-    "relaxation": Entry(
+    "relaxation": EffectEntry(
         "Slip angles that lag behind the motion by a relaxation length",
         "relaxation",
         "a state per wheel, exact within a step",
@@ -258,7 +258,7 @@ TABLE = {
         modules=("models.brake.relaxation",),
         usual_value={"front": 0.3, "rear": 0.3},  # m, chosen
     ),
-    "reservoir": Entry(
+    "reservoir": EffectEntry(
         "A reservoir whose pressure falls as chambers fill from it",
         "pressure.reservoir",
         "a sum over the chambers per sample",
@@ -267,7 +267,7 @@ TABLE = {
         usual_value=40.0,  # l, of a truck
         leave_out=_without_reservoir,
     ),
-    "second_surface": Entry(
+    "second_surface": EffectEntry(
         "A road of more than one surface, along it or across",
         "road.stretches",
         "the surface under each wheel is looked up at every step",
@@ -300,7 +300,7 @@ TABLE = {
         "converted signals",
         {"bits": 12, "range": 40.0},
     ),
-    "slow_apply": Entry(
+    "slow_apply": EffectEntry(
         "Valves with a fourth state beside apply, hold and release: they apply slowly",
         "pressure.slow",
         "one comparison per wheel and step",
@@ -309,14 +309,14 @@ TABLE = {
         leave_out=_without_slow_apply,
         put_in=_with_slow_apply,
     ),
-    "suspension": Entry(
+    "suspension": EffectEntry(
         "A vehicle with suspension from a vehicle file, whose body rolls and pitches under braking",
         "vehicle.file",
         "every freedom of its file, and a step of an engine around the compiled tyres",
         modules=("models.brake.sprung", "models.engines.braking_sprung"),
         leave_out=_without_suspension,
     ),
-    "teeth": Entry(
+    "teeth": EffectEntry(
         "Wheel speeds that are counted from the teeth of a wheel by a timer",
         "port.teeth",
         "the edges of every wheel within each sample",
@@ -324,7 +324,7 @@ TABLE = {
         ("port",),
         usual_value={},
     ),
-    "towed": Entry(
+    "towed": EffectEntry(
         "Bodies that the vehicle of a file tows by a hitch, on springs and wheels of their own",
         "vehicle.file",
         "the coordinates of its hitch and wheels, and a tyre, a brake and a chamber per wheel",
@@ -332,7 +332,7 @@ TABLE = {
         is_present=_tows_bodies,
         leave_out=without_trailer,
     ),
-    "trailer": Entry(
+    "trailer": EffectEntry(
         "A drawbar trailer of two axles behind the truck",
         "trailer",
         "two coordinates and four wheels more",
@@ -341,7 +341,7 @@ TABLE = {
         why="whose file says what it tows",
         put_in=_with_trailer,
     ),
-    "valve_delay": Entry(
+    "valve_delay": EffectEntry(
         "Valves that answer a while after their command",
         "pressure.delay",
         "commands that are kept for as many samples",

@@ -9,12 +9,12 @@ from collections.abc import Callable
 from typing import Any
 
 from models.core.errors import InputError
-from models.core.scene_effects import Entry, Table
+from models.core.scene_effects import EffectEntry, Table
 
 
 def _theory_effect(
     description: str, theory: str, cost: str, count_name: str, method_without: Callable[[Any], dict[str, str]]
-) -> Entry:
+) -> EffectEntry:
     """Returns the effect of a theory beyond FASTSIM. ``method_without`` returns the scene's [method] without this
     theory, except the key cells.
     """
@@ -23,7 +23,7 @@ def _theory_effect(
         cells = {key: value for key, value in table["method"].items() if key == "cells"}
         table["method"] = cells | method_without(scene)
 
-    return Entry(
+    return EffectEntry(
         description,
         "method.name",
         cost,
@@ -85,7 +85,7 @@ BOUND_BY_CONSTANT_FRICTION: dict[str, Any] = {
     "why": "which FASTSIM alone computes",
 }
 TABLE = {
-    "saturation": Entry(
+    "saturation": EffectEntry(
         "Slip: creep forces that friction bounds, by FASTSIM where no other theory is named",
         "method.name",
         "some microseconds per contact, where the linear theory multiplies by a matrix",
@@ -108,7 +108,7 @@ TABLE = {
         "half-spaces",
         _method_without_half_space,
     ),
-    "profiles": Entry(
+    "profiles": EffectEntry(
         "Cross-sections of wheel and rail, whose patches are looked for",
         "profiles",
         "a search for the contact points, once, and a contact computation per patch",
@@ -116,7 +116,7 @@ TABLE = {
         **BOUND_BY_CONSTANT_FRICTION,
         leave_out=_without_profiles,
     ),
-    "falling_friction": Entry(
+    "falling_friction": EffectEntry(
         "Friction that falls with the speed of slip",
         "falling_friction",
         "an exponential per cell, and a march of its own",
@@ -125,7 +125,7 @@ TABLE = {
         modules=("models.contact.fastsim_falling",),
         usual_value={"floor": 0.4, "decay": 0.6, "speed": 20.0},  # of the size of measured values
     ),
-    "spin": Entry(
+    "spin": EffectEntry(
         "Spin of the wheel about the contact's normal",
         "creepage.spin",
         "nothing: the third column of the same creepages",

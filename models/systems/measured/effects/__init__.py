@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from models.core.errors import InputError
-from models.core.scene_effects import Entry, Table
+from models.core.scene_effects import EffectEntry, Table
 
 
-def _transducer_effect(key: str, description: str, cost: str, usual_value: dict[str, Any], **counts: int) -> Entry:
+def _transducer_effect(
+    key: str, description: str, cost: str, usual_value: dict[str, Any], **counts: int
+) -> EffectEntry:
     """Returns an effect of virtual transducers that is present where a key of [virtual.faults] has a value. Measured
     files cannot have it, as their faults are their own.
     """
@@ -26,12 +28,14 @@ def _transducer_effect(key: str, description: str, cost: str, usual_value: dict[
 
     faulty = {name.replace("_", " "): count for name, count in counts.items()}
     needs = ("virtual_measurement",)
-    return Entry(
+    return EffectEntry(
         description, f"virtual.faults.{key}", cost, faulty, needs, why=why, is_present=is_present, put_in=put_in
     )
 
 
-def _stabiliser_effect(method: str, description: str, cost: str, count: str, modules: tuple[str, ...] = ()) -> Entry:
+def _stabiliser_effect(
+    method: str, description: str, cost: str, count: str, modules: tuple[str, ...] = ()
+) -> EffectEntry:
     """Returns the effect of a stabiliser method. Without it roll and pitch are not stabilised, as the other method
     costs more.
     """
@@ -39,7 +43,7 @@ def _stabiliser_effect(method: str, description: str, cost: str, count: str, mod
     def leave_out(table: Table, scene: Any) -> None:
         table.setdefault("stabilise", {})["method"] = "none"
 
-    return Entry(
+    return EffectEntry(
         description,
         "stabilise.method",
         cost,
@@ -93,7 +97,7 @@ TABLE = {
         {"force": 20.0},
         faulty_channels=12,
     ),
-    "own_clocks": Entry(
+    "own_clocks": EffectEntry(
         "Clocks of files that are shifted or too fast",
         "files.0.offset",
         "signals are moved to one clock by interpolation",
@@ -121,7 +125,7 @@ TABLE = {
         {"force": 8.0, "moment": 1.0, "angle": 1.75e-3, "angular rate": 5e-3},
         faulty_channels=29,
     ),
-    "virtual_measurement": Entry(
+    "virtual_measurement": EffectEntry(
         "A virtual measurement in place of files",
         "virtual",
         "a run of the whole vehicle on its tyres, written as a file and read again",

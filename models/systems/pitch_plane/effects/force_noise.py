@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from models.core.noise import normal_samples
-from models.core.signals import Sampled, Smooth
+from models.core.signals import SampledSignal, Smooth
 from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly
 from models.systems.pitch_plane.sampling import PATH_FIELD, SEED_FIELD
@@ -30,6 +30,6 @@ class Parameters(Strict):
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """Returns the assembly with noise added to both wheel forces."""
     signal = assembly.input
-    assert isinstance(signal, Sampled | Smooth)
+    assert isinstance(signal, SampledSignal | Smooth)
     noisy = signal.values + p.deviation * normal_samples(p.seed, p.path, len(signal.values), 2)
     return replace(assembly, input=replace(signal, values=noisy))

@@ -20,8 +20,8 @@ from pydantic import Field
 from models.core.assumptions import Assumption, Watched
 from models.core.errors import InputError
 from models.core.result import Result
-from models.core.signals import Sampled, Smooth
-from models.core.steps import divides
+from models.core.signals import SampledSignal, Smooth
+from models.core.steps import step_divides
 from models.core.strict import Strict, quantity
 from models.core.tables import RADIANS, RADIANS_PER_SECOND
 from models.drift.growth import pitch_spring, rigid_pitch
@@ -103,7 +103,7 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     stiffness, damping = pitch_spring(assembly.parameters, p.bandwidth, p.damping_ratio)
     moment = guide.values @ np.array([[stiffness], [damping]]) + guide.inertia_moment[:, None]
     sprung = assembly.with_spring(PitchSpring("chassis", stiffness, damping))
-    guided = sprung.with_moment(Sampled(moment, guide.period, held=False))
+    guided = sprung.with_moment(SampledSignal(moment, guide.period, held=False))
     return replace(
         guided,
         outputs=(*guided.outputs, partial(_guiding_channels, guide, stiffness, damping)),
@@ -148,7 +148,7 @@ def guide_of(assembly: Assembly, parameters: Parameters) -> GuidingEstimate:
     from models.systems.pitch_plane.pitch_filter import estimate
 
     measured, forces, p_vehicle = _measurement(assembly, parameters), assembly.input, assembly.parameters
-    assert isinstance(forces, Sampled | Smooth)
+    assert isinstance(forces, SampledSignal | Smooth)
     signal = type(forces).__name__, forces.values, forces.period, forces.held
     kind = assembly.mode, assembly.vehicle.geometry, assembly.scene.run.duration
     key = pickle.dumps((kind, p_vehicle.array(), assembly.initial, signal, measured, parameters))
@@ -216,7 +216,7 @@ def _measurement(assembly: Assembly, parameters: Parameters) -> "Measurement":
             raise InputError(path, f"column {name!r}", None, "holds no number at all: leave its deviation out")
     check_end(scene, f"{key_path}.file", parameters.file, len(values) * period)
     assert assembly.input is not None and assembly.input.period is not None
-    if not divides(*sorted((period, assembly.input.period))):
+    if not step_divides(*sorted((period, assembly.input.period))):
         raise InputError(
             scene.file,
             f"{key_path}.file",

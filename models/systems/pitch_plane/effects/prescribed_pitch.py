@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.signals import Smooth, Stacked
+from models.core.signals import Smooth, StackedSignal
 from models.core.smoothing import low_passed
 from models.core.strict import Strict, quantity
 from models.core.tables import RADIANS
@@ -63,7 +63,7 @@ def prescribe(
     motion = Smooth(values, period, derivatives=2, degree=5)
     check_end(scene, f"effects.{effect}.file", p.file, motion.end)
     assert assembly.input is not None
-    guided = assembly.with_input(drive_mode, Stacked((assembly.input, motion)))
+    guided = assembly.with_input(drive_mode, StackedSignal((assembly.input, motion)))
     guided.initial[[*PRESCRIBED_COORDINATES[drive_mode], *(4 + i for i in PRESCRIBED_COORDINATES[drive_mode])]] = (
         motion.at(0.0)[: 2 * len(columns)]
     )
