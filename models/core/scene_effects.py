@@ -1,7 +1,7 @@
 """Modelling effects that scenes name: entries of the system's table of effects, and files of its folder of effects.
 
-A system's ``effects`` is the package that holds them. What a key of the system's own tables names is a line (``EffectEntry``)
-of its ``TABLE``; an effect with physics or code of its own has a file, which nothing registers. The file has
+A system's ``effects`` is the package that holds them. What a key of the system's own tables names is an
+``EffectEntry`` of its ``TABLE``; an effect with physics or code of its own has a file, which nothing registers. It has
 
 - a docstring, whose first sentence is its line in every list;
 - ``COST``, one sentence on what it takes;
@@ -114,15 +114,13 @@ class Effect:
         vars(self).update(attributes)
 
 
-def _effect_of_entry(table_entry: EffectEntry) -> Effect:
+def _effect_of_entry(entry: EffectEntry) -> Effect:
     """An ``Effect`` made from an entry of a system's table, with the attribute names of an effect's file."""
     field_names = ("place", "cost", "needs", "excludes", "why", "after", "modules", "channels")
-    known = {key.upper(): getattr(table_entry, key) for key in field_names}
-    known |= {"COUNTS": {"all": table_entry.counts, **table_entry.in_engines}} if table_entry.counts else {}
-    known |= {"__doc__": table_entry.says, "named": table_entry.named, "leave_out": table_entry.drop}
-    return Effect(
-        known if table_entry.usual_value is None and table_entry.put_in is None else known | {"put_in": table_entry.add}
-    )
+    known = {key.upper(): getattr(entry, key) for key in field_names}
+    known |= {"COUNTS": {"all": entry.counts, **entry.in_engines}} if entry.counts else {}
+    known |= {"__doc__": entry.says, "named": entry.named, "leave_out": entry.drop}
+    return Effect(known if entry.usual_value is None and entry.put_in is None else known | {"put_in": entry.add})
 
 
 def effect_names_of(system_name: str) -> tuple[str, ...]:
@@ -167,9 +165,8 @@ def effect_of(system_name: str, effect_name: str) -> Any:
     try:
         file = import_module(f"{SYSTEMS[system_name].effects}.{effect_name}")
     except (ImportError, SyntaxError) as error:
-        raise InputError(
-            f"{effect_name}.py", "", None, f"is no effect of {system_name} that can be imported: {error}"
-        ) from None
+        allowed = f"is no effect of {system_name} that can be imported: {error}"
+        raise InputError(f"{effect_name}.py", "", None, allowed) from None
     needed = ("PLACE", "leave_out") if hasattr(file, "named") else ("Parameters", "extend")
     missing = [key for key in ("COST", *needed) if not hasattr(file, key)]
     if missing:
@@ -218,9 +215,7 @@ def _is_in_own_tables(effect_file: Path) -> bool:
 
 def read_tables(effect_tables: Mapping[str, Any], system_name: str, scene_path: str) -> Table:
     """Checked parameters of all tables [effects.NAME]; InputError for an effect that is unknown or has another key."""
-    return {
-        name: _checked_effect_table(name, values, system_name, scene_path) for name, values in effect_tables.items()
-    }
+    return {name: _checked_table(name, values, system_name, scene_path) for name, values in effect_tables.items()}
 
 
 def with_effect_tables(scene: Any) -> Any:
@@ -239,28 +234,25 @@ def extended_by_effects(system_object: Any, scene: Any) -> Any:
     return system_object
 
 
-def _extended_by_effect(effect_name: str, effect_module: Any, system_object: Any, effect_table: Any) -> Any:
+def _extended_by_effect(effect_name: str, effect: Any, system_object: Any, effect_table: Any) -> Any:
     """The system's object, extended by one effect; InputError if the effect's ``extend`` fails or returns nothing."""
     try:
-        result = effect_module.extend(system_object, effect_table)
+        result = effect.extend(system_object, effect_table)
     except (InputError, RunFailed):
         raise
     except Exception as error:
         lines = [
-            frame.lineno
-            for frame in traceback.extract_tb(error.__traceback__)
-            if frame.filename == effect_module.__file__
+            frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == effect.__file__
         ]
         allowed = f"line {lines[-1]} stops with {type(error).__name__}: {error}"
         raise InputError(f"{effect_name}.py", "extend", None, allowed) from error
     if result is None:
-        raise InputError(
-            f"{effect_name}.py", "extend", None, "returns nothing: it must give back what it gets, changed"
-        )
+        allowed = "returns nothing: it must give back what it gets, changed"
+        raise InputError(f"{effect_name}.py", "extend", None, allowed)
     return result
 
 
-def _checked_effect_table(effect_name: str, table_values: Any, system_name: str, scene_path: str) -> Any:
+def _checked_table(effect_name: str, table_values: Any, system_name: str, scene_path: str) -> Any:
     """Checked parameters of one table [effects.NAME]; raises InputError for an unknown effect."""
     if effect_name not in effect_names_of(system_name):
         raise InputError(scene_path, f"effects.{effect_name}", None, "no such effect", effect_names_of(system_name))
@@ -303,11 +295,7 @@ def check_combination(present_effects: Iterable[str], scene: Any) -> None:
 
 def _drop_phrase(scene: Any, effect_name: str, present_effects: tuple[str, ...]) -> str:
     """Phrase that names the effects that cannot stand beside the effect ``effect_name``; empty if there are none."""
-    clash = [
-        other_effect
-        for other_effect in effect_of(scene.system, effect_name).EXCLUDES
-        if other_effect in present_effects
-    ]
+    clash = [other for other in effect_of(scene.system, effect_name).EXCLUDES if other in present_effects]
     return f" in place of {' and '.join(map(repr, clash))}, beside which it cannot stand" if clash else ""
 
 
@@ -328,25 +316,24 @@ def table_without_defaults(scene: Any) -> Table:
     return {key: value for key, value in table.items() if key not in ("file", "folder")}
 
 
-def scene_without(scene: Any, *left_out_effects: str) -> Any:
+def scene_without(scene: Any, *left_out: str) -> Any:
     """The scene without the given effects; InputError if an effect cannot be left out or another one needs it."""
     table = table_without_defaults(scene)
-    for name in sorted(left_out_effects, key=lambda name: _dependency_depth(name, scene.system), reverse=True):
+    for name in sorted(left_out, key=lambda name: _dependency_depth(name, scene.system), reverse=True):
         if name in effect_tables_of(scene):
             del table["effects"][name]
         else:
             effect_of(scene.system, name).leave_out(table, scene)
-    smaller = _confirmed_scene(rebuilt_scene(table, scene), left_out_effects, False)
-    needy = [name for name in named_effects(scene) if set(left_out_effects) & {*effect_of(scene.system, name).NEEDS}]
-    gone = [name for name in needy if name not in (*left_out_effects, *named_effects(smaller))]
+    smaller = _confirmed_scene(rebuilt_scene(table, scene), left_out, False)
+    needy = [name for name in named_effects(scene) if set(left_out) & {*effect_of(scene.system, name).NEEDS}]
+    gone = [name for name in needy if name not in (*left_out, *named_effects(smaller))]
     if gone:
         need = "it needs" if len(gone) == 1 else "they need"
         raise InputError(
             scene.file,
             "",
             None,
-            f"{' and '.join(left_out_effects)} cannot be left out alone: leave out {' and '.join(gone)}, too, "
-            f"for {need} it",
+            f"{' and '.join(left_out)} cannot be left out alone: leave out {' and '.join(gone)}, too, for {need} it",
         )
     return smaller
 
@@ -354,8 +341,7 @@ def scene_without(scene: Any, *left_out_effects: str) -> Any:
 def _dependency_depth(effect_name: str, system_name: str) -> int:
     """Length of the longest chain of needed effects from ``effect_name`` on; the longest chains are removed first."""
     return 1 + max(
-        (_dependency_depth(other_effect, system_name) for other_effect in effect_of(system_name, effect_name).NEEDS),
-        default=0,
+        (_dependency_depth(other, system_name) for other in effect_of(system_name, effect_name).NEEDS), default=0
     )
 
 

@@ -346,17 +346,13 @@ def packed_numbers(
 
 
 def _body_numbers(
-    vehicle: SpatialVehicle,
-    body_name: str,
-    listed_bodies: list[str],
-    mujoco_model: mujoco.MjModel,
-    mujoco_indices: MujocoIndices,
+    vehicle: SpatialVehicle, body_name: str, bodies: list[str], mujoco_model: mujoco.MjModel, indices: MujocoIndices
 ) -> list[float]:
     """Numbers, in the callback's table, of a body that may turn, or that carries one that may."""
-    body, number = vehicle.body(body_name), mujoco_indices.bodies[body_name]
+    body, number = vehicle.body(body_name), indices.bodies[body_name]
     first, count = max(int(mujoco_model.body_jntadr[number]), 0), len(body.freedoms)
     sliding = sum(not freedom.startswith("r") for freedom in body.freedoms)
-    parent = listed_bodies.index(body.parent) if body.parent else -1
+    parent = bodies.index(body.parent) if body.parent else -1
     return [parent, number, first, first + sliding, first + count]
 
 

@@ -84,13 +84,8 @@ def vehicle_path(vehicle_name: str, scene_folder: str | Path = ".", scene_path: 
     """Path of the file that ``load_vehicle`` reads for a vehicle. Raises InputError."""
     if not vehicle_name.endswith(".toml"):
         if vehicle_name not in shipped_vehicles():
-            raise InputError(
-                scene_path,
-                key_path,
-                vehicle_name,
-                "no such vehicle; a file of your own ends in .toml or .xml",
-                shipped_vehicles(),
-            )
+            allowed = "no such vehicle; a file of your own ends in .toml or .xml"
+            raise InputError(scene_path, key_path, vehicle_name, allowed, shipped_vehicles())
         return SHIPPED_FOLDER / f"{vehicle_name}.toml"
     return existing_file(vehicle_name, Path(scene_folder), scene_path, key_path)
 
@@ -169,12 +164,10 @@ class _VehicleBuilder:
         locked = frozenset(place for place in places if list(place) in table.locked)
         return ReductionLimits(frozenset(table.massless), frozenset(table.rigid), locked)
 
-    def _require(
-        self, condition: Any, key_path: str, wrong_value: Any, allowed_text: str, allowed_names: Sequence[str] = ()
-    ) -> None:
+    def _require(self, condition: Any, key_path: str, value: Any, allowed: str, choices: Sequence[str] = ()) -> None:
         """Raise InputError unless the condition ``condition`` holds."""
         if not condition:
-            raise InputError(self.file, key_path, wrong_value, allowed_text, tuple(allowed_names))
+            raise InputError(self.file, key_path, value, allowed, tuple(choices))
 
     def _unique(self, table_name: str, entries: Sequence[Any], reserved_names: Sequence[str] = ()) -> None:
         names = [entry.name for entry in entries]
@@ -215,22 +208,17 @@ class _VehicleBuilder:
             del waiting[ready.name]
         return done | {s.name: Body(s.name, s.mass, _vector_of_numbers(s.position), ("z",)) for s in self.tables.seats}
 
-    def _hitch(self, towed_body: Body, hitch_point: Vector) -> Body:
+    def _hitch(self, body: Body, point: Vector) -> Body:
         """Massless body with the rotations of a towed body, at the point where its parent tows it."""
-        place, name = _key_path("bodies", towed_body.name), hitch_of(towed_body.name)
+        place, name = _key_path("bodies", body.name), hitch_of(body.name)
         self._require(
-            towed_body.parent,
-            f"{place}.hitch",
-            list(hitch_point),
-            "nothing tows it: name the body that does as its parent",
+            body.parent, f"{place}.hitch", list(point), "nothing tows it: name the body that does as its parent"
         )
-        turns = "rz" in towed_body.freedoms and all(freedom.startswith("r") for freedom in towed_body.freedoms)
-        self._require(
-            turns, f"{place}.freedoms", list(towed_body.freedoms), "a towed body turns about its hitch: rz, rx, ry"
-        )
+        turns = "rz" in body.freedoms and all(freedom.startswith("r") for freedom in body.freedoms)
+        self._require(turns, f"{place}.freedoms", list(body.freedoms), "a towed body turns about its hitch: rz, rx, ry")
         names = [each.name for each in (*self.tables.bodies, *self.tables.seats)]
         self._require(name not in names, f"{place}.hitch", name, "is the name of another body: the hitch needs it")
-        return Body(name, 0.0, hitch_point, towed_body.freedoms, parent=towed_body.parent)
+        return Body(name, 0.0, point, body.freedoms, parent=body.parent)
 
     def _towed_under(self, body_name: str | None) -> str | None:
         """Name of the towed body that is, or carries, the given body; None if there is none."""
@@ -252,27 +240,25 @@ class _VehicleBuilder:
             self._require(name in named, _key_path("axles", name), None, "no tyre names this axle")
         return axles
 
-    def _spring(self, spring_table: SpringTable) -> SpringDamper:
-        place = _key_path("springs", spring_table.name)
-        ends, points = self._two_bodies(place, spring_table.bodies), self._points(place, spring_table)
-        axis = self._axis(place, spring_table, points)
-        gains = spring_table.stiffness, spring_table.damping
-        acts = any((*gains, spring_table.friction, spring_table.travel_force, spring_table.rate_force))
+    def _spring(self, spring: SpringTable) -> SpringDamper:
+        place = _key_path("springs", spring.name)
+        ends, points = self._two_bodies(place, spring.bodies), self._points(place, spring)
+        axis = self._axis(place, spring, points)
+        gains = spring.stiffness, spring.damping
+        acts = any((*gains, spring.friction, spring.travel_force, spring.rate_force))
         self._require(acts, f"{place}.stiffness", None, "is missing: neither spring, damper, curve nor friction")
-        travel, rate = (
-            self._curve(f"{place}.{key}", getattr(spring_table, key)) for key in ("travel_force", "rate_force")
-        )
+        travel, rate = (self._curve(f"{place}.{key}", getattr(spring, key)) for key in ("travel_force", "rate_force"))
         return SpringDamper(
-            spring_table.name,
+            spring.name,
             *ends,
             *points,
             axis,
             *gains,
             travel,
             rate,
-            spring_table.friction,
-            spring_table.friction_rate,
-            self._frame(place, spring_table.frame, ends),
+            spring.friction,
+            spring.friction_rate,
+            self._frame(place, spring.frame, ends),
         )
 
     def _frame(self, key_path: str, frame_name: str | None, end_bodies: tuple[str, str | None]) -> str | None:
