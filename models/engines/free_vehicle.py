@@ -146,12 +146,8 @@ class PlainModel(FreeModel):
     ) -> None:
         """acceleration_function : function that gives accelerations (n,) at a time (s), positions and rates (n,);
         engine : name of a run."""
-        self.ENGINE, self.equations, self.size, self.settings = (
-            engine,
-            acceleration_function,
-            coordinate_count,
-            run_settings,
-        )  # type: ignore[misc]
+        self.ENGINE = engine  # type: ignore[misc]
+        self.equations, self.size, self.settings = acceleration_function, coordinate_count, run_settings
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), from positions and rates (n,)."""
