@@ -122,7 +122,7 @@ def test_a_folder_above_is_read_where_the_user_names_it(tmp_path):
     path = _file(tmp_path, '<mujoco><include file="../parts/b.xml"/></mujoco>', "models/a.xml")
     assert f"`--folder {tmp_path}`" in _refusal(path)
     assert read_model_file(path, allowed_folder=tmp_path).twin.size == 1
-    assert "must be a folder that holds" in _refusal(path, folder=tmp_path / "parts")
+    assert "must be a folder that holds" in _refusal(path, allowed_folder=tmp_path / "parts")
     path = _file(tmp_path, '<mujoco><include file="/x.xml"/></mujoco>', "models/a.xml")
     assert "--folder" not in _refusal(path)
     path = _file(tmp_path, '<mujoco><include file="gone.xml"/></mujoco>', "models/a.xml")
