@@ -42,12 +42,12 @@ def test_every_kernel_is_compiled_that_way():
     own = {name for name, text in sources.items() if "numba.njit(" in text or "from numba import njit" in text}
     assert own == {"compiled.py"}
     nested = [name for name, text in sources.items() if re.search(r"^ +@(register_jitable|njit)", text, re.MULTILINE)]
-    assert not nested, "closures take a name of their own by models.machine.compiled.named_closure"
+    assert not nested, "closures take a name of their own by models.machine.compiled.closure_with_unique_name"
 
 
 FACTORY = """
 from numba.extending import register_jitable
-from models.machine.compiled import named_closure, njit
+from models.machine.compiled import closure_with_unique_name, njit
 
 def inner(factor):
     def times(x):
@@ -61,7 +61,7 @@ def kernel(factor):
     times = inner(factor)
     def whole(x):
         return times(x) + times(2 * x)
-    return njit(cache=True)(named_closure(whole, int(factor)))
+    return njit(cache=True)(closure_with_unique_name(whole, int(factor)))
 """
 
 
@@ -78,7 +78,7 @@ def answers(folder, name, *factors):
 
 def test_closures_of_one_factory_never_stand_in_for_one_another(tmp_path):
     """Two processes keep a kernel each, a third loads both: each must call its own inner function, 3 times 1 x."""
-    named = "named_closure(times, int(factor))"
+    named = "closure_with_unique_name(times, int(factor))"
     assert answers(tmp_path, named, 2.0) == pytest.approx([6.0])
     assert answers(tmp_path, named, 3.0) == pytest.approx([9.0])
     assert answers(tmp_path, named, 2.0, 3.0) == pytest.approx([6.0, 9.0])
@@ -91,9 +91,9 @@ def test_a_change_of_the_equations_is_seen(tmp_path):
     copy = tmp_path / "models"
     shutil.copytree(Path(models.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
     script = (
-        "import numpy as np; from models.engines.reference import derivative_of; "
+        "import numpy as np; from models.engines.reference import compiled_derivative; "
         "from models.vehicles.parameters.itwm_drift import PARAMETERS as p; "
-        "print(derivative_of('road', 'exact')(np.full(8, 0.1), np.zeros(4), p.array())[7])"
+        "print(compiled_derivative('road', 'exact')(np.full(8, 0.1), np.zeros(4), p.array())[7])"
     )
 
     def answer():
