@@ -18,7 +18,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from docs.pages import ROOT
-from models.core.scene_effects import effect_sentences, module_of, names_of
+from models.core.scene_effects import effect_names_of, effect_of, effect_sentences
 from models.core.scene_file import SceneFile
 from models.core.strict import LARGEST_QUANTITY
 from models.core.systems import SYSTEMS
@@ -38,7 +38,7 @@ READER_FIELDS = ("file", "folder")
 """Fields of a scene that are no keys, but state where it was read."""
 OTHER_TABLES = (
     ("Vehicle files", "models.vehicles.vehicle_tables", "VehicleTable"),
-    ("Parameters of the pitch-plane vehicle", "models.vehicles.pitch_plane", "Parameters"),
+    ("Parameters of the pitch-plane vehicle", "models.vehicles.pitch_plane", "PitchPlaneParameters"),
     ("Parameters of a wheelset", "models.rail.wheelset", "Wheelset"),
     ("Parameters of a bicycle", "models.bicycle.whipple", "Whipple"),
     ("Parameters of a braked vehicle", "models.brake.plane_vehicle", "Truck"),
@@ -200,15 +200,15 @@ def system_section(system: str) -> list[str]:
             "|---|---|---|---|",
             *(_effect_row(system, name, says) for name, says in effect_sentences(system).items()),
         ]
-    for name in names_of(system):
-        model = getattr(module_of(system, name), "Parameters", None)
+    for name in effect_names_of(system):
+        model = getattr(effect_of(system, name), "Parameters", None)
         if model is not None and model.model_fields:
             lines += ["", f"`[effects.{name}]` of {system}", "", *keys_table(model)]
     return lines
 
 
 def _effect_row(system: str, name: str, sentence: str) -> str:
-    module = module_of(system, name)
+    module = effect_of(system, name)
     place = module.PLACE if hasattr(module, "named") else f"[effects.{name}]"
     cells = (f"`{name}`", f"`{place}`", sentence, str(module.COST).rstrip("."))
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

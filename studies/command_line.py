@@ -17,7 +17,7 @@ from typer.exceptions import TyperException
 from models.core.errors import InputError, RunFailed
 from models.core.result_folders import check_unused
 from models.core.whole_files import write_error_phrase
-from models.machine.left_out import OF_LABELS, leave_out
+from models.machine.left_out import OF_LABELS, hide_libraries
 from models.measured.file_kinds import is_measurement
 from studies.command.asked import (
     check_for_any_engine,
@@ -195,7 +195,7 @@ def run_scene(
         with progress_bar("checking the scene", loaded.system):
             module = checked_study(loaded, engines)
         if runs_without_extras(loaded, engines, module):
-            leave_out(*OF_LABELS)
+            hide_libraries(*OF_LABELS)
         folder = results_folder_of(
             Path(loaded.file).stem, getattr(module, "BLOCKS_FOLDER", None), loaded.study, out, resume
         )

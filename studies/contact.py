@@ -14,7 +14,7 @@ from models.contact.theories import ExactTheoryOnEllipse, FastsimTheory, Rolling
 from models.core.errors import InputError
 from models.core.result import Result
 from models.core.strict import Strict, read
-from models.machine.seconds import cost, duration
+from models.machine.seconds import duration_text, seconds_text
 from models.systems import run as run_scene
 from models.systems.contact.run import ContactResults, fields_by_cell, inputs_of_scene_contact, touching_points
 from models.systems.contact.scene import ContactMethod, ContactScene
@@ -76,9 +76,8 @@ def _table_lines(scene: ContactScene, creep_forces: Result) -> list[str]:
         f"  normal load {p.load:,.0f} N, approach {1e6 * p.approach:.2f} um, {size}area {1e6 * p.area:.2f} mm^2, "
         f"largest pressure {1e-6 * p.peak:,.0f} MPa",
         *_contact_point_lines(scene),
-        f"  pressed in {duration(rolls.pressing_seconds)} once, rolled in {cost(rolls.rolling_seconds)} at each "
-        + "creepage"
-        + ", errors included" * bool(rolls.errors),
+        f"  pressed in {duration_text(rolls.pressing_seconds)} once, "
+        f"rolled in {seconds_text(rolls.rolling_seconds)} at each creepage" + ", errors included" * bool(rolls.errors),
         f"  forces on the wheel by {theory_text(scene.method)}; mu N = {limit:,.0f} N",
         f"    {'xi_x [-]':>10}{'xi_y [-]':>10}{'spin [1/m]':>11}{'Fx [N]':>10}{'Fy [N]':>10}{'Mz [N m]':>10}"
         f"{'stick':>7}{'loss [N]':>10}"

@@ -10,7 +10,7 @@ from pydantic import Field
 from models.core.errors import InputError
 from models.core.strict import Strict, read
 from models.core.whole_files import write_whole
-from models.machine.seconds import cost
+from models.machine.seconds import seconds_text
 from models.systems.contact.run import inputs_of_scene_contact
 from models.systems.contact.scene import ContactScene
 from models.systems.contact.work_precision import TheoryPoint, cheapest_lines, priced_theories
@@ -77,7 +77,7 @@ def _table_lines(theory_points: list[TheoryPoint], contact_count: int, reference
         f"    {'':<28}{'cells':>6}{'mean':>8}{'95 of 100':>11}{'largest':>9}   time of contacts",
         *(
             f"    {point.name:<28}{point.cells:>6}{100 * point.mean:>8.2f}{100 * point.quantile_95:>11.2f}"
-            f"{100 * max(point.errors):>9.2f}   {cost((point.seconds, *point.range))}"
+            f"{100 * max(point.errors):>9.2f}   {seconds_text((point.seconds, *point.range))}"
             for point in theory_points
         ),
         "  cheapest that meets      in the mean; in 95 of 100 contacts",

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from models.core.errors import InputError
-from models.machine.seconds import duration
+from models.machine.seconds import duration_text
 from models.systems import run as run_scene
 from models.systems.contact.run import BLOCKS_FOLDER
 from models.systems.contact.scene import ContactScene

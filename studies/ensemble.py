@@ -19,7 +19,7 @@ from models.core.assumptions import Watched, with_assumptions
 from models.core.discretisation import sampling_error, with_sampling_error
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
-from models.core.steps import divides
+from models.core.steps import step_divides
 from models.core.strict import Strict, quantity, read
 from models.core.told import Results
 from models.core.whole_files import write_whole
@@ -68,11 +68,11 @@ def check(scene: Scene, engines: tuple[str, ...]) -> Options:
         if CATALOGUE[engine][str(settings.integrator)].adaptive or settings.step != scene.run.step:
             allowed = "an ensemble compares states at run.step: name no adaptive integrator and no other step"
             raise InputError(scene.file, f"engines.{engine}", None, allowed)
-    if not (divides(scene.run.step, options.rows) and divides(options.rows, scene.run.duration)):
+    if not (step_divides(scene.run.step, options.rows) and step_divides(options.rows, scene.run.duration)):
         allowed = f"must be a multiple of run.step = {scene.run.step:g} s and divide run.duration"
         raise InputError(scene.file, "options.rows", options.rows, allowed)
     for time in options.times:
-        if not 0 < time <= scene.run.duration or not divides(options.rows, time):
+        if not 0 < time <= scene.run.duration or not step_divides(options.rows, time):
             allowed = f"each must be a multiple of options.rows = {options.rows:g} s within the run"
             raise InputError(scene.file, "options.times", time, allowed)
     return options

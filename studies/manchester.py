@@ -9,7 +9,7 @@ import numpy as np
 
 from models.core.result import Result
 from models.core.tables import write_table
-from models.machine.seconds import cost
+from models.machine.seconds import seconds_text
 from models.rail.contact_table import WheelsetPlacement
 from models.systems.wheel_rail import run as system
 from models.systems.wheel_rail.plan import case_text
@@ -66,7 +66,7 @@ def run(
         )
         contacts = result.detail
         failed |= {f"{name}, {shift:g} mm": why for shift, why in contacts.failures.items()}
-        text = f"{case_text(case.yaw, case.friction)}; {cost(contacts.seconds)} a position"
+        text = f"{case_text(case.yaw, case.friction)}; {seconds_text(contacts.seconds)} a position"
         table += [f"  {name}: {text}", *_table_lines(contacts.placements)]
         if contacts.placements:
             _save_tables(name, result, output_folder)

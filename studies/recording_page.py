@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from models.core.assumptions import assumption_sentences, broken_of
+from models.core.assumptions import assumption_sentences, broken_assumptions_of
 from models.core.discretisation import error_lines
 from models.core.result import Result
 from models.core.whole_files import write_whole
@@ -52,7 +52,7 @@ def page_text(examined_recording: RecordingAnalysis, output_folder: Path, saved_
         exam=examined_recording,
         names=RUN_NAMES,
         errors=error_lines(saved_result),
-        breaches=[breach.line() for breach in broken_of(saved_result)],
+        breaches=[breach.line() for breach in broken_assumptions_of(saved_result)],
         assumed=assumption_sentences(saved_result),
         free=FREE_RUN_NAME,
         weights=[finding.weight for finding in examined_recording.findings],

@@ -13,7 +13,7 @@ from models.core.result import Channel, Result, result
 from models.core.strict import Strict, read
 from models.core.told import derived_result
 from models.core.whole_files import write_whole
-from models.machine.seconds import cost
+from models.machine.seconds import seconds_text
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import vehicle_with_road
 from models.systems import run as run_scene
@@ -190,7 +190,7 @@ def _table_lines(
         of_kinds = [values[(kinds == kind) & np.isfinite(values)] for kind in shown]
         worst = [f"{100 * max(of_kind, key=abs):+.1f} %" if len(of_kind) else "-" for of_kind in of_kinds]
         columns = "".join(f"{text:>22}" for text in worst)
-        lines.append(f"    {f'{model}, {road}':<{width}}{cost(computing_times[model]):>30}{columns}")
+        lines.append(f"    {f'{model}, {road}':<{width}}{seconds_text(computing_times[model]):>30}{columns}")
     return lines
 
 

@@ -20,7 +20,7 @@ from models.systems.ride.nonlinear import EngineRide, NonlinearRide, RunSampling
 from models.systems.ride.of_scene import excitation_of, has_no_linear_equivalent, vehicle_of
 from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import SpatialVehicle, TyreOutput
-from models.vehicles.spatial_linear import preloads, wheels
+from models.vehicles.spatial_linear import static_preloads, wheels
 
 SYSTEM = "ride"
 ReportProgress = Callable[[str, float], None]
@@ -166,7 +166,7 @@ def _lift_off_shares(
     if not vehicle.lifts:
         return []
     loads, names, largest_deviations = (
-        preloads(vehicle).tyres,
+        static_preloads(vehicle).tyres,
         nonlinear_sweep.shown.covariance.names,
         nonlinear_sweep.deviation.max(axis=0),
     )

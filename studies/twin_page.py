@@ -9,7 +9,7 @@ from typing import Any
 
 from models.core.whole_files import write_whole
 from models.drawing.pages import environment_of
-from models.own_model.elements import Element, elements_of_model, is_word, two_digit_text, value_text
+from models.own_model.elements import ModelProperty, elements_of_model, is_word, two_digit_text, value_text
 from studies.command.twin import TwinResults, verdict_sentence
 
 PAGE_TEMPLATE = "twin.html.jinja"
@@ -42,7 +42,7 @@ def page_text(twin_results: TwinResults) -> str:
     )
 
 
-def _element_rows(model_elements: list[Element]) -> list[dict[str, Any]]:
+def _element_rows(model_elements: list[ModelProperty]) -> list[dict[str, Any]]:
     """Kind, owner, unit and value text of each nonzero element of a model file, for the page's table."""
     return [
         {"kind": element.kind, "owner": element.owner, "unit": element.unit, "value": value_text(element.value)}

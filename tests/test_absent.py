@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import models
-from models.core.scene_effects import module_of, names_of
+from models.core.scene_effects import effect_names_of, effect_of
 from models.core.systems import DEFAULT_SYSTEM
 from models.systems.pitch_plane.scene import assembly_of_scene
 from validation.absence import ride
@@ -38,7 +38,7 @@ from validation.cases.effect_prices import hand_built_run
 
 BARE = {"title": "bare", "run": {"duration": 0.02, "step": 0.001}, "start": {"pitch": 0.1}}
 FORCED = {**BARE, "effects": FORCE_EFFECT}
-ROAD = module_of(DEFAULT_SYSTEM, "road").EXAMPLE
+ROAD = effect_of(DEFAULT_SYSTEM, "road").EXAMPLE
 EFFECT_FILES = "systems/pitch_plane/effects"
 
 
@@ -115,7 +115,7 @@ def test_user_functions_are_counted(folder):
     assert user_functions(engine_model(scene_with_effects({"road": ROAD}, 50, folder), "exudyn")) == 4
     guided = {
         **required_effects("prescribed_pitch"),
-        "prescribed_pitch": module_of(DEFAULT_SYSTEM, "prescribed_pitch").EXAMPLE,
+        "prescribed_pitch": effect_of(DEFAULT_SYSTEM, "prescribed_pitch").EXAMPLE,
     }
     built = engine_model(scene_with_effects(guided, 50, folder, has_prescribed_pitch=True), "exudyn")
     assert user_functions(built) == built.plan()["callbacks"] == 4
@@ -157,7 +157,7 @@ def test_the_same_numbers_with_the_other_effects_files_removed(kept, bare, force
     copy = tmp_path / "models"
     shutil.copytree(Path(models.__file__).parent, copy)
     shutil.rmtree(copy / "road")
-    for name in {*names_of(DEFAULT_SYSTEM)} - {*kept}:
+    for name in {*effect_names_of(DEFAULT_SYSTEM)} - {*kept}:
         (copy / EFFECT_FILES / f"{name}.py").unlink()
     for name in ("mujoco_callback", "mujoco_layout"):
         (copy / "engines" / f"{name}.py").unlink()

@@ -7,11 +7,11 @@ import pytest
 from models.core.errors import InputError
 from models.core.scene_effects import (
     absent_effects,
-    check,
+    check_effects,
+    effect_names_of,
+    effect_of,
     effect_sentences,
-    module_of,
     named_effects,
-    names_of,
     rebuilt_scene,
     scene_without,
     table_without_defaults,
@@ -43,7 +43,7 @@ def test_an_effect_adds_what_its_file_says(system, effect):
 
 def test_a_bare_scene_names_nothing():
     for system in ("contact", "braking", "handling"):
-        assert named_effects(bare_scene(system)) == () and absent_effects(bare_scene(system)) == names_of(system)
+        assert named_effects(bare_scene(system)) == () and absent_effects(bare_scene(system)) == effect_names_of(system)
 
 
 def test_the_counts_see_an_effect_that_says_nothing_of_itself(monkeypatch):
@@ -95,7 +95,7 @@ def test_a_remedy_that_would_break_another_law_says_so():
         match=r"force_noise: needs the effect 'wheel_forces': name it too in place of "
         "'road', beside which it cannot stand",
     ):
-        check(scene)
+        check_effects(scene)
 
 
 def test_what_cannot_be_put_in_is_refused():
@@ -108,9 +108,9 @@ def test_what_cannot_be_put_in_is_refused():
 @pytest.mark.parametrize("system", [name for name, own in SYSTEMS.items() if own.effects])
 def test_every_effect_of_every_system_can_be_listed_and_judged(system):
     assert all(effect_sentences(system).values())
-    for name in names_of(system):
-        module = module_of(system, name)
-        assert {*module.NEEDS, *module.EXCLUDES} <= {*names_of(system)} - {name} and module.COST
+    for name in effect_names_of(system):
+        module = effect_of(system, name)
+        assert {*module.NEEDS, *module.EXCLUDES} <= {*effect_names_of(system)} - {name} and module.COST
         assert {*module.COUNTS} <= {"all", *SYSTEMS[system].engines}
         assert hasattr(module, "extend") != hasattr(module, "leave_out")
         assert system == DEFAULT_SYSTEM or not module.COUNTS or name in addable_effects(system), (

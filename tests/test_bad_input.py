@@ -22,7 +22,7 @@ from models.core.systems import SYSTEMS, load
 from models.road.opencrg import write_opencrg
 from models.road.study import study_road
 from models.systems.pitch_plane.plan import check
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 from studies import command_line
 
 JARGON = ("Traceback", "pydantic", "Input should", "dictionary", "validation error", "instance of", "NoneType")
@@ -215,7 +215,7 @@ EXTREME = (1e308, 1e-308, 5e-324, 1e40, 1e15, 1e-15, 1e-20, -1, 0, 1234567890123
 def test_no_number_ends_in_a_traceback(scene, folder):
     """Every number of a scene made huge or tiny: accepted or refused, without an overflow on the way."""
     (folder / "ride.toml").write_text(scene)
-    parameters = [f"vehicle.override.{name}" for name in Parameters.model_fields]
+    parameters = [f"vehicle.override.{name}" for name in PitchPlaneParameters.model_fields]
     others = [
         "run.step",
         "run.duration",

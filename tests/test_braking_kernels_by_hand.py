@@ -12,7 +12,7 @@ from models.brake.plane_chain import factorise_mass, fill_headings, fill_mass_ma
 from models.brake.plane_step import JUMP_WIDTH
 from models.brake.plane_vehicle import GRAVITY, PAPER_TRUCK, plane_of_truck
 from models.brake.trailer import CHOSEN_TRAILER, plane_of_trailer, plane_of_train
-from models.engines.braking import set_held
+from models.engines.braking import set_constant_wheel_forces
 from models.tyre.magic_formula import table_of_surface
 from models.tyre.tyre_table import StackedTyreTables, TyreTable, stacked_tables
 from validation.braking.braked_truck import RollingTruck, constant_friction, on_road, truck_on_tables
@@ -76,7 +76,7 @@ def test_wheels_act_on_a_train_by_the_work_of_their_forces():
         ([units, wheels], plane.arm_lengths.ravel(), plane.unit, plane.place.T.ravel(), steer, held.ravel())
     )
     block = np.concatenate((np.full(q.size, 9.0), q, np.zeros(q.size), numbers))
-    set_held(block.ctypes.data, 0.0, q.size)
+    set_constant_wheel_forces(block.ctypes.data, 0.0, q.size)
 
     def centres(x):
         absolute = np.concatenate((x[:2], np.cumsum(x[2:])))

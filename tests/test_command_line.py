@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from models.core.errors import RunFailed
-from models.core.result import load
+from models.core.result import load_result
 from studies import command_line, single_run
 
 HEAVY = ("numpy", "scipy", "numba", "exudyn", "mujoco", "xarray", "h5netcdf", "matplotlib", "pydantic", "jinja2")
@@ -108,7 +108,7 @@ def test_run_saves_every_engine_and_prints_json_alone(twinrig, capsys):
     assert len(summary["largest difference of states"]) == 3
     assert max(summary["largest difference of states"].values()) < 1e-12
     for engine in ENGINES:
-        result = load(Path("results/study_road") / f"{engine}.nc")
+        result = load_result(Path("results/study_road") / f"{engine}.nc")
         assert result.times[-1] == 0.05 and result.counts()["steps"] == 50
         assert all(channel.attrs["units"] for channel in result.data.data_vars.values())
     assert Path("results/study_road/states.png").read_bytes().startswith(b"\x89PNG")
@@ -124,7 +124,7 @@ def test_run_prints_a_summary_for_people(twinrig, capsys):
 
 def test_set_changes_one_engine_alone(twinrig):
     assert twinrig("run", "release", *SHORT, "--set", "engines.mujoco.step=5e-4", "--out", "out") == 0
-    steps = {engine: load(Path("out") / f"{engine}.nc").counts()["steps"] for engine in ENGINES}
+    steps = {engine: load_result(Path("out") / f"{engine}.nc").counts()["steps"] for engine in ENGINES}
     assert steps == {"reference": 50, "exudyn": 50, "mujoco": 100}
 
 
@@ -143,7 +143,7 @@ def test_a_study_as_a_script_gives_the_same_as_the_command(twinrig):
     assert set(json.loads(done.stdout)["runs"]) == set(ENGINES)
     assert twinrig("run", "study_road", *SHORT, "--out", "command") == 0
     for engine in ENGINES:
-        one, other = (load(Path(folder) / f"{engine}.nc") for folder in ("script", "command"))
+        one, other = (load_result(Path(folder) / f"{engine}.nc") for folder in ("script", "command"))
         assert (one.states == other.states).all() and list(one.data.data_vars) == list(other.data.data_vars)
 
 
@@ -186,7 +186,7 @@ def test_an_interrupted_run_keeps_what_was_finished(twinrig, monkeypatch, capsys
     assert "interrupted; finished results are kept in results/release-2" in capsys.readouterr().err
     assert before.items() <= contents("results").items()
     assert [path.name for path in Path("results/release-2").iterdir()] == ["reference.nc"]
-    assert load(Path("results/release-2/reference.nc")).times[-1] == 0.05
+    assert load_result(Path("results/release-2/reference.nc")).times[-1] == 0.05
 
 
 def test_an_interrupt_before_the_first_result_leaves_no_folder(twinrig, monkeypatch):

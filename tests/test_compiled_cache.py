@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import models
-from models.engines.reference import derivative_of, march_of
+from models.engines.reference import compiled_derivative, compiled_march
 from models.machine import compiled
 
 MODES = (
@@ -23,7 +23,7 @@ MODES = (
 
 
 def test_no_two_kernels_share_a_cache_file():
-    names = [make(*mode)._cache._impl.filename_base for make in (march_of, derivative_of) for mode in MODES]
+    names = [make(*mode)._cache._impl.filename_base for make in (compiled_march, compiled_derivative) for mode in MODES]
     assert len(set(names)) == len(names)
 
 
@@ -31,7 +31,7 @@ def test_two_processes_never_write_the_same_file(tmp_path):
     """Both read an empty index, then each keeps its own signature: numba's own names would be one and the same."""
     from numba.core.caching import IndexDataCacheFile
 
-    file = march_of("road", "exact")._cache._cache_file
+    file = compiled_march("road", "exact")._cache._cache_file
     assert file._data_name(1) != file._data_name(1)
     plain = IndexDataCacheFile(str(tmp_path), "kernel", None)
     assert plain._data_name(1) == plain._data_name(1)  # as soon as this fails, numba has its own cure
@@ -42,12 +42,12 @@ def test_every_kernel_is_compiled_that_way():
     own = {name for name, text in sources.items() if "numba.njit(" in text or "from numba import njit" in text}
     assert own == {"compiled.py"}
     nested = [name for name, text in sources.items() if re.search(r"^ +@(register_jitable|njit)", text, re.MULTILINE)]
-    assert not nested, "closures take a name of their own by models.machine.compiled.named_closure"
+    assert not nested, "closures take a name of their own by models.machine.compiled.closure_with_unique_name"
 
 
 FACTORY = """
 from numba.extending import register_jitable
-from models.machine.compiled import named_closure, njit
+from models.machine.compiled import closure_with_unique_name, njit
 
 def inner(factor):
     def times(x):
@@ -61,7 +61,7 @@ def kernel(factor):
     times = inner(factor)
     def whole(x):
         return times(x) + times(2 * x)
-    return njit(cache=True)(named_closure(whole, int(factor)))
+    return njit(cache=True)(closure_with_unique_name(whole, int(factor)))
 """
 
 
@@ -78,7 +78,7 @@ def answers(folder, name, *factors):
 
 def test_closures_of_one_factory_never_stand_in_for_one_another(tmp_path):
     """Two processes keep a kernel each, a third loads both: each must call its own inner function, 3 times 1 x."""
-    named = "named_closure(times, int(factor))"
+    named = "closure_with_unique_name(times, int(factor))"
     assert answers(tmp_path, named, 2.0) == pytest.approx([6.0])
     assert answers(tmp_path, named, 3.0) == pytest.approx([9.0])
     assert answers(tmp_path, named, 2.0, 3.0) == pytest.approx([6.0, 9.0])
@@ -91,9 +91,9 @@ def test_a_change_of_the_equations_is_seen(tmp_path):
     copy = tmp_path / "models"
     shutil.copytree(Path(models.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
     script = (
-        "import numpy as np; from models.engines.reference import derivative_of; "
+        "import numpy as np; from models.engines.reference import compiled_derivative; "
         "from models.vehicles.parameters.itwm_drift import PARAMETERS as p; "
-        "print(derivative_of('road', 'exact')(np.full(8, 0.1), np.zeros(4), p.array())[7])"
+        "print(compiled_derivative('road', 'exact')(np.full(8, 0.1), np.zeros(4), p.array())[7])"
     )
 
     def answer():
@@ -119,11 +119,11 @@ def test_machine_code_is_as_old_as_the_kernels_that_its_file_imports_from_other_
     monkeypatch.setattr(compiled, "ROOT", tmp_path)
     found = {}
     for changed in ("a/mine.py", "b/theirs.py", "c/deep.py", "c/other.py"):
-        before = compiled.stamp(tmp_path / "models" / "a" / "mine.py")
+        before = compiled.source_checksum(tmp_path / "models" / "a" / "mine.py")
         path = tmp_path / "models" / changed
         path.write_text(path.read_text() + "# changed\n")
-        compiled.checksum.cache_clear()
-        found[changed] = compiled.stamp(tmp_path / "models" / "a" / "mine.py") != before
+        compiled.folder_checksum.cache_clear()
+        found[changed] = compiled.source_checksum(tmp_path / "models" / "a" / "mine.py") != before
     assert found == {"a/mine.py": True, "b/theirs.py": True, "c/deep.py": True, "c/other.py": False}
 
 
@@ -131,7 +131,7 @@ def test_a_kernel_that_is_given_another_one_is_as_old_as_that():
     from models.brake.sprung_step import compiled as stepping
     from models.engines.mujoco_native import accelerate, march
 
-    files = compiled._files(stepping("in_a_test", accelerate=accelerate, march=march).py_func)
+    files = compiled._compiled_source_files(stepping("in_a_test", accelerate=accelerate, march=march).py_func)
     assert {file.name for file in files} >= {"sprung_step.py", "plane_step.py", "mujoco_native.py"}
 
 

@@ -15,7 +15,7 @@ from models.ride.sweep import DIRECT_BY_REQUEST, variance_sweep
 from models.ride.weighting import WEIGHTINGS, system_with_weightings
 from models.road.excitation import RoadExcitation
 from models.road.two_track import CORRELATION_CASES, road_excitation, road_of_level
-from models.vehicles.linear_vehicle import Output
+from models.vehicles.linear_vehicle import LinearOutput
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.ride.rides import quarter_car_vehicle
@@ -113,8 +113,10 @@ def test_the_five_covariances_of_the_road_itself(truck):
     vehicle, roads = truck
     rows = np.eye(len(vehicle.wheels))
     no = np.zeros(len(vehicle.mass))
-    heights = tuple(Output(f"z{i}", "m", "road", no, no, no, row, 0 * row) for i, row in enumerate(rows))
-    heights += tuple(Output(f"z{i}+z{i + 2}", "m", "road", no, no, no, rows[i] + rows[i + 2], no[:6]) for i in (0, 1))
+    heights = tuple(LinearOutput(f"z{i}", "m", "road", no, no, no, row, 0 * row) for i, row in enumerate(rows))
+    heights += tuple(
+        LinearOutput(f"z{i}+z{i + 2}", "m", "road", no, no, no, rows[i] + rows[i + 2], no[:6]) for i in (0, 1)
+    )
     from models.road.two_track import input_covariance
 
     for case, (left_right, front_rear) in CORRELATION_CASES.items():

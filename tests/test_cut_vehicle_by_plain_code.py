@@ -11,7 +11,7 @@ from models.multibody.cut_table import HubInputs
 from models.multibody.plain.hubs import PlainHubs
 from models.multibody.plain.motion import BIAS, FIRST_DERIVATIVE, PLACE
 from models.systems.measured.sections import AccelerometerPoint, Sections
-from models.vehicles.cut_vehicle import CutVehicle, cut
+from models.vehicles.cut_vehicle import CutVehicle, cut_at_hubs
 from validation.spatial.cars import r19, rough_car, static_forces, twin
 from validation.spatial.written_equations import cut_state
 
@@ -29,7 +29,7 @@ def turning() -> CutVehicle:
         else s
         for s in whole.springs
     ]
-    return cut(replace(whole, springs=tuple(springs)), "body")
+    return cut_at_hubs(replace(whole, springs=tuple(springs)), "body")
 
 
 def hub_inputs_of(vehicle: CutVehicle, rows: int) -> HubInputs:

@@ -14,7 +14,7 @@ import twinrig
 from docs import scene_keys, validation_cases
 from docs.pages import ROOT, example_blocks, pages
 from models.core.errors import InputError
-from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, of_table
+from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, scene_of_table
 from models.vehicles.vehicle_file import build_vehicle
 from studies.command.asked import KNOWN_SYSTEMS, SCENES_FOLDER, plan_module_of, requested_engines
 
@@ -108,7 +108,7 @@ def test_every_scene_and_vehicle_of_the_pages_is_valid(name, text, empty_folder)
         build_vehicle(table, name)
     elif "title" in table:
         try:
-            scene = of_table(table, name, empty_folder, KNOWN_SYSTEMS)
+            scene = scene_of_table(table, name, empty_folder, KNOWN_SYSTEMS)
             plan_module_of(scene).check(scene, requested_engines(None, scene.system)[:1])
         except InputError as refused:
             assert "no such file" in str(refused)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from models.engines.reference import derivative_of
-from models.vehicles.description import matrices
+from models.engines.reference import compiled_derivative
+from models.vehicles.description import mass_damping_stiffness
 from models.vehicles.parameters import asymmetric_twin, itwm_drift
-from models.vehicles.pitch_plane import describe, equilibrium
+from models.vehicles.pitch_plane import equilibrium, pitch_plane_vehicle
 
 SETS = {"itwm_drift": itwm_drift.PARAMETERS, "asymmetric_twin": asymmetric_twin.PARAMETERS}
 RANDOM = np.random.default_rng(7)
@@ -48,7 +48,7 @@ def test_force_excitation_is_equation_37(p):
         mass, stiff, damp = paper_matrix(p, y[3])
         load = np.array([p.m1 * p.g - f[0], p.m2 * p.g - f[1], p.m3 * p.g, 0.0])
         expected = (stiff @ y[:4] + damp @ y[4:] + load) / mass
-        found = derivative_of("force", "exact")(y, f, p.array())
+        found = compiled_derivative("force", "exact")(y, f, p.array())
         assert np.allclose(found[:4], y[4:], rtol=0, atol=0)
         # 1e-12 of the largest: a dozen products of doubles
         assert np.abs(found[4:] - expected).max() <= 1e-12 * np.abs(expected).max()
@@ -67,7 +67,7 @@ def test_road_excitation_is_equation_38(p):
             [p.m1 * p.g + p.k1 * u[0] + p.d1 * u[2], p.m2 * p.g + p.k2 * u[1] + p.d2 * u[3], p.m3 * p.g, 0.0]
         )
         expected = (stiff @ y[:4] + damp @ y[4:] + load) / mass
-        found = derivative_of("road", "exact")(y, u, p.array())[4:]
+        found = compiled_derivative("road", "exact")(y, u, p.array())[4:]
         assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
 
 
@@ -91,19 +91,19 @@ def test_prescribed_pitch_is_equation_39_with_its_third_row_repaired(p):
         )
         expected = (rows + load) / np.array([p.m1, p.m2, p.m3])
         u = np.array([*f, beta, rate, second])
-        found = derivative_of("pitch", "exact")(y, u, p.array())
+        found = compiled_derivative("pitch", "exact")(y, u, p.array())
         assert np.abs(found[4:7] - expected).max() <= 1e-12 * np.abs(expected).max()
         assert found[7] == second
 
 
 @pytest.mark.grounds("closed form")
 def test_linear_geometry_is_the_linearisation(p):
-    mass, damping, stiffness = matrices(describe(p, "linear"))
+    mass, damping, stiffness = mass_damping_stiffness(pitch_plane_vehicle(p, "linear"))
     for _ in range(20):
         y = RANDOM.uniform(-0.5, 0.5, 8)
         weight = p.g * np.array([p.m1, p.m2, p.m3, 0.0])
         expected = np.linalg.solve(mass, weight - stiffness @ y[:4] - damping @ y[4:])
-        found = derivative_of("road", "linear")(y, np.zeros(4), p.array())[4:]
+        found = compiled_derivative("road", "linear")(y, np.zeros(4), p.array())[4:]
         assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
 
 
@@ -119,15 +119,15 @@ def test_linear_forms_with_forces_and_guides_are_the_paper_s_at_no_pitch(p):
     for _ in range(20):
         y, f, guide = RANDOM.uniform(-0.7, 0.7, 8), RANDOM.uniform(-1e4, 1e4, 2), RANDOM.uniform(-0.7, 0.7, 6)
         load = np.array([p.m1 * p.g - f[0], p.m2 * p.g - f[1], p.m3 * p.g, 0.0])
-        free = derivative_of("force", "linear")(y.copy(), f, p.array())
+        free = compiled_derivative("force", "linear")(y.copy(), f, p.array())
         assert free == pytest.approx(np.concatenate((y[4:], level(p, y, load))), rel=1e-12)
         pitched = y.copy()
         pitched[[3, 7]] = guide[:2]
-        by_pitch = derivative_of("pitch", "linear")(y.copy(), np.concatenate((f, guide[:3])), p.array())
+        by_pitch = compiled_derivative("pitch", "linear")(y.copy(), np.concatenate((f, guide[:3])), p.array())
         expected = np.concatenate((pitched[4:], level(p, pitched, load)[:3], guide[2:3]))
         assert by_pitch == pytest.approx(expected, rel=1e-12)
         y[[2, 3, 6, 7]] = guide[:4]
-        both = derivative_of("heave-pitch", "linear")(y.copy(), np.concatenate((f, guide)), p.array())
+        both = compiled_derivative("heave-pitch", "linear")(y.copy(), np.concatenate((f, guide)), p.array())
         assert both == pytest.approx(np.concatenate((y[4:], level(p, y, load)[:2], guide[4:])), rel=1e-12)
 
 
@@ -155,14 +155,14 @@ def test_tyres_that_only_push_are_wheel_forces_of_equation_37(p, geometry):
         load = np.array([p.m1 * p.g - forces[0], p.m2 * p.g - forces[1], p.m3 * p.g, 0.0])
         expected = np.concatenate((y[4:], (stiff @ y[:4] + damp @ y[4:] + load) / mass))
         damped = p.model_copy(update={"d1": 300.0, "d2": 500.0})
-        assert derivative_of("lift-off", geometry)(y, u, damped.array()) == pytest.approx(expected, rel=1e-11)
+        assert compiled_derivative("lift-off", geometry)(y, u, damped.array()) == pytest.approx(expected, rel=1e-11)
     assert seen == {True, False}
 
 
 @pytest.mark.parametrize("geometry", ["exact", "linear"])
 def test_static_equilibrium_is_at_rest(p, geometry):
     y = equilibrium(p, geometry)
-    rest = derivative_of("road", geometry)(y, np.zeros(4), p.array())
+    rest = compiled_derivative("road", geometry)(y, np.zeros(4), p.array())
     # forces of some kN on 15 kg cancel to their last digits
     assert np.abs(rest).max() < 1e-10
 
@@ -183,7 +183,7 @@ def test_body_fixed_forces_have_no_cosine_in_their_moment(p):
         y[3] = beta
         y[0] = -p.b * np.sin(beta) - f[0] * np.cos(beta) / p.k3
         y[1] = p.a * np.sin(beta) - f[1] * np.cos(beta) / p.k4
-        found = derivative_of("force-body", "exact")(y, f, light.array())[7] * p.I
+        found = compiled_derivative("force-body", "exact")(y, f, light.array())[7] * p.I
         assert found == pytest.approx(p.b * f[0] - p.a * f[1], rel=1e-12)
 
 
@@ -191,9 +191,9 @@ def test_a_nose_up_moment_lifts_the_front(p):
     """More force at the front wheel than at the rear one pitches the nose up (positive)."""
     y = equilibrium(p)
     y[0] += 0.01
-    assert derivative_of("force", "exact")(y, np.array([p.k1 * y[0], p.k2 * y[1]]), p.array())[7] < 0
+    assert compiled_derivative("force", "exact")(y, np.array([p.k1 * y[0], p.k2 * y[1]]), p.array())[7] < 0
     y[0] -= 0.02
-    assert derivative_of("force", "exact")(y, np.array([p.k1 * y[0], p.k2 * y[1]]), p.array())[7] > 0
+    assert compiled_derivative("force", "exact")(y, np.array([p.k1 * y[0], p.k2 * y[1]]), p.array())[7] > 0
 
 
 @pytest.mark.parametrize("interpolation", ["held", "linear", "smooth"])

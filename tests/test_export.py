@@ -14,8 +14,8 @@ from models.engines.export import ExportSubject, export_free_vehicle
 from models.engines.exudyn_system import mass_and_force, set_start
 from models.engines.free_vehicle_exudyn import FreeExudyn
 from models.engines.free_vehicle_mujoco import compiled_model
-from models.engines.mujoco_inertia import realisable
-from models.engines.native_parts import divide
+from models.engines.mujoco_inertia import with_realisable_inertia
+from models.engines.native_parts import divide_between_engine_and_callback
 from models.engines.protocol import build
 from models.engines.spatial_exudyn import SpatialExudyn
 from models.engines.spatial_mujoco import SpatialMujoco
@@ -27,7 +27,7 @@ from models.systems.hub_forces.export import export_cut_vehicle
 from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.ride.of_scene import vehicle_of
 from models.systems.wheelset.of_scene import equations_of
-from models.vehicles.cut_vehicle import cut
+from models.vehicles.cut_vehicle import cut_at_hubs
 from studies.command.asked import load_scene
 from studies.command.export import exported_vehicle
 from validation.spatial.cars import r19, rough_car, twin
@@ -132,7 +132,7 @@ def test_the_pitch_plane_alone_moves_as_in_the_product(engine, geometry, tmp_pat
     assert np.abs(found - wanted).max() < 1e-10 * np.abs(wanted).max()
 
 
-CARS = {"shipped": r19, "twin": lambda: cut(twin(), "body"), "rough": rough_car}
+CARS = {"shipped": r19, "twin": lambda: cut_at_hubs(twin(), "body"), "rough": rough_car}
 
 
 @pytest.mark.parametrize("car", CARS)
@@ -143,9 +143,11 @@ def test_a_cut_car_alone_moves_as_in_the_product(engine, car, tmp_path):
     answer = export_cut_vehicle(engine, whole, ExportSubject("car", "car.toml", ""), [])
     tree = whole.tree
     if engine == "mujoco":
-        tree, lowered = realisable(tree)
+        tree, lowered = with_realisable_inertia(tree)
         assert lowered == [text for text in answer.left_out if "inertia" in text]
-    smooth = tuple(part.element for part in divide(whole.tree, whole.elements, engine).native)
+    smooth = tuple(
+        part.element for part in divide_between_engine_and_callback(whole.tree, whole.elements, engine).native
+    )
     hub_inputs = HubInputs(np.zeros((3, 6 * len(whole.hubs))))
     product = hub_model(engine, replace(whole, tree=tree, elements=smooth), hub_inputs, 1e-3, 1e-3, "native")
     assert product.division.shared == ()
@@ -155,7 +157,7 @@ def test_a_cut_car_alone_moves_as_in_the_product(engine, car, tmp_path):
 def test_parts_that_are_left_out_of_a_cut_car_are_named():
     for engine in ("mujoco", "exudyn"):
         car = rough_car()
-        reasons = divide(car.tree, car.elements, engine).reasons
+        reasons = divide_between_engine_and_callback(car.tree, car.elements, engine).reasons
         answer = export_cut_vehicle(engine, rough_car(), ExportSubject("car", "car.toml", ""), ["stabiliser"])
         assert reasons
         assert all(any(name in text and why in text for text in answer.left_out) for name, why in reasons.items())
@@ -194,7 +196,7 @@ def test_a_car_on_its_carrier_alone_moves_as_in_the_product(engine, system, tmp_
     if engine == "exudyn":
         product = bare_exudyn(FreeExudyn(driven).mbs)
     else:
-        product = bare_mujoco(compiled_model(replace(driven, vehicle=realisable(driven.vehicle)[0])))
+        product = bare_mujoco(compiled_model(replace(driven, vehicle=with_realisable_inertia(driven.vehicle)[0])))
     assert error(text, engine, product, size, tmp_path) < 1e-10
     named = exported_vehicle(scene, engine).left_out
     parts = [*driven.vehicle.springs, *driven.vehicle.bars, *driven.vehicle.tyres]
@@ -218,7 +220,7 @@ def test_a_vehicle_of_the_ride_alone_moves_as_in_the_product(engine, scene, tmp_
     scene = load_scene(scene, None)
     text, vehicle = text_of(scene, engine), vehicle_of(scene)
     if engine == "mujoco":
-        product = bare_mujoco(SpatialMujoco(realisable(vehicle)[0], None, 20.0, None).model)
+        product = bare_mujoco(SpatialMujoco(with_realisable_inertia(vehicle)[0], None, 20.0, None).model)
     else:
         product = bare_exudyn(SpatialExudyn(vehicle, None, 20.0, None).mbs)
     assert error(text, engine, product, len(vehicle.coordinates()), tmp_path) < 1e-10

@@ -14,7 +14,7 @@ from models.engines import exudyn as exudyn_engine
 from models.engines import protocol, stability
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import build, check_balance, guard
+from models.engines.protocol import build, check_balance, check_trajectory
 from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.cases import guards
@@ -24,7 +24,7 @@ LIMITED = [
     (engine, name)
     for engine, names in CATALOGUE.items()
     for name in names
-    if stability.step_matrix(name, 1e-3, stability.linearised(setups.vehicle().vehicle)) is not None
+    if stability.step_matrix(name, 1e-3, stability.linearised_matrices(setups.vehicle().vehicle)) is not None
 ]
 
 
@@ -46,7 +46,7 @@ def measured(engine: str, integrator: str, geometry: str, steps: int, guided: bo
 @pytest.mark.parametrize("geometry", ["exact", "linear"])
 @pytest.mark.parametrize(("engine", "integrator"), LIMITED)
 def test_step_matrix_is_what_the_engine_does(engine, integrator, geometry):
-    linear = stability.linearised(setups.vehicle("asymmetric_twin").vehicle)
+    linear = stability.linearised_matrices(setups.vehicle("asymmetric_twin").vehicle)
     matrix = stability.step_matrix(integrator, 1e-3, linear)
     power = np.linalg.matrix_power(matrix, 5)
     if integrator == "VelocityVerlet":  # it begins with the acceleration of the start
@@ -59,7 +59,7 @@ def test_step_matrix_is_what_the_engine_does(engine, integrator, geometry):
 @pytest.mark.parametrize(("engine", "integrator"), [("reference", "RK4"), ("mujoco", "RK4"), ("mujoco", "Euler")])
 def test_step_matrix_of_the_guided_vehicle(engine, integrator):
     base = setups.vehicle("asymmetric_twin").without_tyres()
-    matrix = stability.step_matrix(integrator, 1e-3, stability.linearised(base.vehicle, (3,)))
+    matrix = stability.step_matrix(integrator, 1e-3, stability.linearised_matrices(base.vehicle, (3,)))
     found = measured(engine, integrator, "linear", 5, guided=True)[np.ix_([0, 1, 2, 4, 5, 6], [0, 1, 2, 4, 5, 6])]
     assert np.abs(np.linalg.matrix_power(matrix, 5) - found).max() < 1e-10
 
@@ -75,7 +75,7 @@ def test_step_matrix_of_the_guided_vehicle(engine, integrator):
     ],
 )
 def test_limits_are_the_textbook_ones(integrator, limit):
-    linear = stability.linearised(setups.vehicle().vehicle)
+    linear = stability.linearised_matrices(setups.vehicle().vehicle)
     assert stability.longest_stable_step(integrator, 0.1, 1000.0, linear) == pytest.approx(limit, rel=2e-4)
 
 
@@ -83,7 +83,7 @@ def test_limits_are_the_textbook_ones(integrator, limit):
 def test_the_limit_separates_decay_from_growth(engine, integrator):
     assembly = setups.vehicle()
     pushed = replace(assembly, initial=assembly.initial + 1e-6)
-    linear = stability.linearised(assembly.vehicle)
+    linear = stability.linearised_matrices(assembly.vehicle)
     limit = stability.longest_stable_step(integrator, 0.1, 300.0, linear)
     below, above = (float(f"{limit * part:.3g}") for part in (0.97, 1.03))
     end = setups.unchecked_run(engine, pushed, below, 400 * below, integrator).states[-1]
@@ -154,12 +154,14 @@ def test_a_missing_balance_fails_the_row(monkeypatch):
 )
 def test_the_guard_names_what_it_found(times, states, reason):
     with pytest.raises(RunFailed, match=reason):
-        guard("engine", np.array(times), states, 1.0)
+        check_trajectory("engine", np.array(times), states, 1.0)
 
 
 def test_a_moment_that_is_no_number_fails_the_run():
     with pytest.raises(RunFailed, match="not a number"):
-        guard("engine", np.array([0.0, 1.0]), np.zeros((2, 8)), 1.0, enforcing_forces=np.array([[0.0], [np.nan]]))
+        check_trajectory(
+            "engine", np.array([0.0, 1.0]), np.zeros((2, 8)), 1.0, enforcing_forces=np.array([[0.0], [np.nan]])
+        )
 
 
 def test_a_multiplier_may_be_small_beside_the_inertia_term():

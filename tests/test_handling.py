@@ -9,13 +9,13 @@ from scipy.integrate import quad
 
 from models.core.errors import InputError, RunFailed
 from models.multibody import forces
-from models.multibody.numbers import Controls, Handling, Push, Tyres
+from models.multibody.numbers import Controls, ExternalPush, Handling, TyreParameters
 from models.road.plane_waves import plane_waves
 from models.systems.handling.run import SimulatedDrive, drive_run
 from models.systems.handling.scene import build
 from models.tyre.bristles import FADING_SPEED, brush_forces
 from models.vehicles.free_vehicle import SWAY, free_vehicle
-from models.vehicles.spatial_linear import mass
+from models.vehicles.spatial_linear import design_mass_matrix
 from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.load_transfer import turning_car, turning_error
 from validation.braking.sprung_box import box
@@ -82,7 +82,7 @@ def test_free_vehicle_has_all_of_the_mass() -> None:
     free = free_vehicle(R19, spin_inertia=1.7)
     total = sum(body.mass for body in R19.bodies)
     assert len(free.coordinates()) == 23
-    assert mass(free)[:2, :2] == pytest.approx(total * np.eye(2), rel=1e-9)
+    assert design_mass_matrix(free)[:2, :2] == pytest.approx(total * np.eye(2), rel=1e-9)
 
 
 @pytest.mark.grounds("closed form")
@@ -91,8 +91,8 @@ def test_the_chassis_feels_the_inertia_of_the_whole_vehicle_in_roll_and_pitch() 
     free = free_vehicle(R19, spin_inertia=1.7)
     whole = sum(body.mass * body.position[2] for body in R19.bodies)
     roll, pitch = (free.coordinates().index((SWAY, turn)) for turn in ("rx", "ry"))
-    assert mass(free)[0, pitch] == pytest.approx(whole, rel=1e-9)
-    assert mass(free)[1, roll] == pytest.approx(-whole, rel=1e-9)
+    assert design_mass_matrix(free)[0, pitch] == pytest.approx(whole, rel=1e-9)
+    assert design_mass_matrix(free)[1, roll] == pytest.approx(-whole, rel=1e-9)
 
 
 def test_loads_balance_the_inertia_of_the_whole_vehicle() -> None:
@@ -105,7 +105,7 @@ def test_a_vehicle_without_cornering_is_refused() -> None:
     with pytest.raises(InputError, match="cornering stiffness of every tyre"):
         Handling(replace(R19, side_forces=R19.side_forces[:3]))
     with pytest.raises(InputError, match="no such tyre"):
-        Handling(R19, Tyres(fixed=("fx",)))
+        Handling(R19, TyreParameters(fixed=("fx",)))
 
 
 def test_what_pushes_a_rotor_pushes_all_that_it_rides_on() -> None:
@@ -114,7 +114,7 @@ def test_what_pushes_a_rotor_pushes_all_that_it_rides_on() -> None:
     still = np.zeros(len(Handling(R19).vehicle.coordinates()))
     found = {}
     for body in ("fl", "fl rotor"):
-        at_centre = Push(body, R19.body("fl").position, (0.6, 0.8, 0.0), ((0.0, 1000.0),))
+        at_centre = ExternalPush(body, R19.body("fl").position, (0.6, 0.8, 0.0), ((0.0, 1000.0),))
         found[body] = still.copy()
         report, ledger = np.zeros((4, forces.REPORTED)), np.zeros(forces.LEDGER)
         forces.all_forces(Handling(R19, pushes=(at_centre,)).numbers, 0.0, still, still, found[body], report, ledger)
@@ -161,7 +161,7 @@ def test_engines_agree_where_all_wheels_slide_and_lift() -> None:
 def braked_turn() -> SimulatedDrive:
     """800 N m of braking, 7 parts of 10 in front, while the car begins to turn left, 0.2 s."""
     controls = Controls(steer=((0.0, 0.0), (0.1, 0.03)), brake=((0.0, 0.0), (0.1, 800.0)), front_brake=0.7)
-    return drive_run("mujoco", Handling(R19, Tyres(cells=5), controls), 20.0, 0.2)
+    return drive_run("mujoco", Handling(R19, TyreParameters(cells=5), controls), 20.0, 0.2)
 
 
 @pytest.mark.grounds("closed form")
@@ -190,12 +190,12 @@ def test_lateral_acceleration_is_that_of_the_place_below_the_chassis(braked_turn
 @pytest.mark.full
 def test_a_step_that_cannot_follow_slow_tyres_is_told() -> None:
     with pytest.raises(RunFailed, match=r"damps its wheel faster than steps of 0\.001 s"):
-        drive_run("mujoco", Handling(R19, Tyres(fixed=("fl", "fr", "rl", "rr")), slope=0.05), 0.0, 0.05, 1e-3)
+        drive_run("mujoco", Handling(R19, TyreParameters(fixed=("fl", "fr", "rl", "rr")), slope=0.05), 0.0, 0.05, 1e-3)
 
 
 def test_car_that_turns_over_is_no_result() -> None:
     """Friction of a race track on a high car's steer: 89 m/s^2 were printed for it once."""
     controls = Controls(steer=((0.1, 0.0), (0.3, 0.3)))
-    handling = Handling(R19, replace(Tyres(), friction=1.5), controls)
+    handling = Handling(R19, replace(TyreParameters(), friction=1.5), controls)
     with pytest.raises(RunFailed, match=r"turns over.*t = "):
         drive_run("mujoco", handling, 60.0, 1.5, 1e-3)

@@ -68,7 +68,7 @@ def test_without_the_step_check_a_short_unstable_run_is_silent(implementation, m
 
 
 def test_without_the_guard_a_huge_run_is_silent(monkeypatch, tmp_path):
-    monkeypatch.setattr(exudyn_engine, "guard", lambda *_, **__: None)
+    monkeypatch.setattr(exudyn_engine, "check_trajectory", lambda *_, **__: None)
     assert found(stepping, "finite but huge states", "exudyn", tmp_path) == "SILENT"
 
 

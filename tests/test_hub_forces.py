@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.core.discretisation import WARNED_SHARE, errors_of
+from models.core.discretisation import WARNED_SHARE, error_estimates_of
 from models.core.errors import InputError, Refused, RunFailed
-from models.core.result import load
+from models.core.result import load_result
 from models.engines.cut_vehicle import build
 from models.multibody.cut_table import HubInputs
 from models.road.iso8608 import iso8608_road
@@ -22,7 +22,7 @@ from models.systems.hub_forces.measurement import (
 from models.systems.hub_forces.run import inputs_with_angles, run
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import StatedDeviations, estimate_tilt, inputs_with_moments
-from models.vehicles.cut_vehicle import PITCH, ROLL, cut, rigid_vehicle
+from models.vehicles.cut_vehicle import PITCH, ROLL, cut_at_hubs, rigid_vehicle
 from models.vehicles.spatial_linear import linearise
 from studies.hub_forces import save_measurement_and_runs
 from validation.cases import hub_forces as case
@@ -38,7 +38,7 @@ def test_the_quick_share_passes(tmp_path):
 
 def test_without_symmetry_the_engines_agree_too():
     # 1e-10: a wrong product of inertia or arm would show at 1e-2
-    assert all(row.status == "passed" for row in case._acceleration_rows("twin", cut(twin(), "body")))
+    assert all(row.status == "passed" for row in case._acceleration_rows("twin", cut_at_hubs(twin(), "body")))
 
 
 @pytest.mark.grounds("plain counterpart")
@@ -168,10 +168,10 @@ def test_steps_that_the_road_is_too_fast_for_are_told():
 
     with pytest.raises(RunFailed, match=r"this is no answer: .* use at most") as refusal:
         run(scene_of(table(60.0, 0.02, 50.0), "s.toml"), "mujoco", error=True)
-    advised = min(each.step for each in errors_of(refusal.value.partial).values())
+    advised = min(each.step for each in error_estimates_of(refusal.value.partial).values())
     for own in (table(60.0, 0.02 / np.ceil(0.02 / advised), 50.0), table(20.0, 2.5e-3, 200.0)):
         told = run(scene_of(own, "s.toml"), "mujoco", error=True)
-        assert max(each.share for each in errors_of(told).values()) < WARNED_SHARE
+        assert max(each.share for each in error_estimates_of(told).values()) < WARNED_SHARE
 
 
 def test_a_file_of_ones_own(tmp_path, measured):
@@ -182,7 +182,7 @@ def test_a_file_of_ones_own(tmp_path, measured):
     del own["road"]
     again = compare_stabilisers(scene_of(own, "s.toml", tmp_path), ("mujoco",))
     assert np.array_equal(again.runs["filter"].detail.states, comparison.runs["filter"].detail.states)
-    saved = load(tmp_path / "runs.nc")
+    saved = load_result(tmp_path / "runs.nc")
     assert list(saved.data["run"].values) == ["true", *comparison.runs] and saved.data.attrs["system"] == "hub-forces"
     assert np.array_equal(saved.data["roll"].sel(run="filter").values, comparison.runs["filter"]["roll"])
     header, *rows = (tmp_path / "hub_forces.csv").read_text().splitlines()

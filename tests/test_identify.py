@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.core.discretisation import errors_of
+from models.core.discretisation import error_estimates_of
 from models.core.errors import InputError, RunFailed
 from models.core.systems import load
 from models.core.tables import write_table
@@ -63,8 +63,8 @@ def test_a_drive_tells_the_error_of_its_steps_between_samples(scene, stiffer):
     changes = {axle: {**table()[axle], "stiffness": stiffer * table()[axle]["stiffness"]} for axle in ("front", "rear")}
     stiff = build(table(**changes), "car.toml", scene.folder)
     driven, true = run(stiff, error=True), single_track._sensed_in_finer_steps(stiff, *_given(stiff), 16)
-    assert set(errors_of(driven)) == set(true)
-    for name, estimate in errors_of(driven).items():
+    assert set(error_estimates_of(driven)) == set(true)
+    for name, estimate in error_estimates_of(driven).items():
         off = float(np.sqrt(np.mean((driven[name] - true[name]) ** 2)))
         assert off / 3.0 < estimate.error < 3.0 * off and estimate.unit == UNITS[name]
 

@@ -15,8 +15,8 @@ from models.measured.axle_forces import FILE_REMEDIES, AxleForces, check_axle_fo
 from models.measured.signal import MeasuredSignal
 from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.parameters import asymmetric_twin, itwm_drift
-from models.vehicles.plausible import plausible
-from models.vehicles.plausible_plane import plausible_plane
+from models.vehicles.plausible import implausible_values
+from models.vehicles.plausible_plane import implausible_plane_values
 from models.vehicles.vehicle_file import SHIPPED_FOLDER, load_vehicle, shipped_vehicles
 from studies.command.asked import input_findings_of, load_scene
 from validation.common.scenes import road_scene
@@ -218,8 +218,10 @@ def test_an_error_refuses_the_run_unless_it_is_accepted(tmp_path):
 
 
 def test_shipped_vehicles_raise_no_query():
-    assert not [finding for name in shipped_vehicles() for finding in plausible(load_vehicle(name, allows_towing=True))]
-    assert not plausible_plane(itwm_drift.PARAMETERS) and not plausible_plane(TWIN)
+    assert not [
+        finding for name in shipped_vehicles() for finding in implausible_values(load_vehicle(name, allows_towing=True))
+    ]
+    assert not implausible_plane_values(itwm_drift.PARAMETERS) and not implausible_plane_values(TWIN)
 
 
 PLANE = {
@@ -237,9 +239,9 @@ PLANE = {
 @pytest.mark.parametrize("name", PLANE)
 def test_parameters_of_no_vehicle_are_queried(name):
     change, kind = PLANE[name]
-    found = plausible_plane(TWIN.model_copy(update=change))
+    found = implausible_plane_values(TWIN.model_copy(update=change))
     assert kind in {finding.check for finding in found} and all(finding.weight == "doubt" for finding in found)
-    assert kind not in {finding.check for finding in plausible_plane(TWIN.model_copy(update=change), [kind])}
+    assert kind not in {finding.check for finding in implausible_plane_values(TWIN.model_copy(update=change), [kind])}
 
 
 def car():
@@ -286,7 +288,7 @@ SPACE = {
 @pytest.mark.parametrize("name", SPACE)
 def test_vehicles_that_no_one_builds_are_queried(name):
     fault, kind = SPACE[name]
-    assert kind in {finding.check for finding in plausible(fault(car()))}
+    assert kind in {finding.check for finding in implausible_values(fault(car()))}
 
 
 def test_a_whole_row_without_a_line_end_is_read_and_remarked_on(tmp_path):

@@ -10,7 +10,7 @@ from models.core.time_series import read_time_series, write_time_series
 from models.drift.innovations import FALSE_ALARM_SHARE, consistency
 from models.engines.assembly import Settings
 from models.engines.protocol import build
-from models.engines.stability import first_order, linearised
+from models.engines.stability import first_order, linearised_matrices
 from models.systems.pitch_plane import pitch_filter
 from models.systems.pitch_plane.pitch_filter import (
     FILTERED_STATES,
@@ -76,7 +76,9 @@ def angles(folder):
 def matrices(assembly):
     p, pushes = assembly.parameters, np.zeros((8, 2))
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
-    return RELATIVE_STATES @ first_order(linearised(assembly.vehicle))[:, FILTERED_STATES], RELATIVE_STATES @ pushes
+    return RELATIVE_STATES @ first_order(linearised_matrices(assembly.vehicle))[
+        :, FILTERED_STATES
+    ], RELATIVE_STATES @ pushes
 
 
 @pytest.mark.parametrize("interpolation", ["held", "linear"])

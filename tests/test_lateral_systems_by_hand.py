@@ -10,7 +10,7 @@ import pytest
 from models.bicycle.four_bodies import BicycleRide
 from models.bicycle.rolling_tyres import RollingBicycle
 from models.bicycle.whipple import load_bicycle
-from models.core.systems import of_table
+from models.core.systems import scene_of_table
 from models.rail.flange_climbing import nadal_limit, shares_of_bounds
 from models.rail.wheelset import CHOSEN_WHEELSET
 from models.ride.covariance import stationary_covariance
@@ -30,7 +30,7 @@ ENGINES = ("reference", "exudyn", "mujoco")
 def bicycle_run(engine, speed, lean_rate):
     table = {"title": "t", "system": "bicycle", "bicycle": {"parameters": "benchmark"}}
     ridden = {"speed": speed, "lean_rate": lean_rate, "duration": 0.04, "step": 2e-4}
-    return run(of_table({**table, "run": ridden, "control": {"encoder_gain": 0.85}}, "s.toml", Path()), engine)
+    return run(scene_of_table({**table, "run": ridden, "control": {"encoder_gain": 0.85}}, "s.toml", Path()), engine)
 
 
 @pytest.mark.grounds("published")
@@ -73,7 +73,7 @@ def test_energy_that_is_not_accounted_for_is_told_by_that_of_the_start():
 def test_a_wheelset_begins_where_its_scene_says_and_its_rails_carry_the_load(engine):
     table = {"title": "t", "system": "wheelset", "speeds": {"values": [20.5]}, "contact": {"law": "linear"}}
     moving = {"duration": 0.01, "step": 5e-4, "displacement": 1.5e-4}
-    result = run(of_table({**table, "run": moving}, "s.toml", Path()), engine, speed=20.5)
+    result = run(scene_of_table({**table, "run": moving}, "s.toml", Path()), engine, speed=20.5)
     assert result["y"][0] == pytest.approx(1.5e-4, rel=1e-12) and result["yaw"][0] == 0.0
     assert result["spin"][0] == pytest.approx(-20.5 / CHOSEN_WHEELSET.radius, rel=1e-4)
     assert result["normal"][0].sum() * math.cos(CHOSEN_WHEELSET.conicity) == pytest.approx(
@@ -95,7 +95,7 @@ def test_nadal_s_limit_and_shares_of_a_bound():
 def test_a_ride_has_the_variances_of_the_direct_route(engine):
     """Lyapunov's equation of the whole system at each speed, of the linear vehicle by its written matrices."""
     table = {"title": "t", "system": "ride", "vehicle": {"file": "r19_ride"}, "road": {"level": 1.6e-5}}
-    scene = of_table({**table, "speeds": {"values": [12.5, 25.5]}}, "s.toml", Path())
+    scene = scene_of_table({**table, "speeds": {"values": [12.5, 25.5]}}, "s.toml", Path())
     result, vehicle = run(scene, engine), load_vehicle("r19_ride")
     road = excitation_of(scene, wheels(vehicle))
     for row, speed in enumerate((12.5, 25.5)):

@@ -29,8 +29,8 @@ from models.systems.ride.nonlinear import drive_over_road
 from models.systems.ride.of_scene import check_linear, excitation_of, vehicle_of
 from models.systems.ride.scene import build as build_ride
 from models.vehicles import pitch_plane_equations
-from models.vehicles.pitch_plane import describe
-from models.vehicles.spatial_linear import preloads, wheels
+from models.vehicles.pitch_plane import pitch_plane_vehicle
+from models.vehicles.spatial_linear import static_preloads, wheels
 from models.vehicles.vehicle_file import load_vehicle
 from studies import ride_nonlinear
 from validation.common import checks
@@ -116,7 +116,9 @@ def test_a_wheel_alone_bounces_by_the_closed_form(engine):
     height, k, m, g = 0.05, 4e4, 25.0, 9.81
     base = assembly_of_scene(scene())
     p = base.parameters.model_copy(update={"k1": k, "m1": m, "d1": 0.0, "k3": 0.0, "k4": 0.0, "d3": 0.0, "d4": 0.0})
-    alone = lift_off.extend(replace(base, parameters=p, vehicle=describe(p), initial=-height * np.eye(8)[0]), None)
+    alone = lift_off.extend(
+        replace(base, parameters=p, vehicle=pitch_plane_vehicle(p), initial=-height * np.eye(8)[0]), None
+    )
     run = build(engine, alone, Settings(INTEGRATORS[engine], 1e-4, 0.5)).run()
     omega, fall, speed = np.sqrt(k / m), np.sqrt(2.0 * height / g), np.sqrt(2.0 * g * height)
     contact = 2.0 * (np.pi - np.arctan2(speed, m * g / k * omega)) / omega
@@ -206,7 +208,7 @@ def test_a_tyre_that_pulls_in_one_implementation_is_seen(monkeypatch):
             pitch_plane_equations.newton_euler(y, law(y, u, p), struts, np.cos(y[3]), p, dy)
             return dy
 
-        monkeypatch.setattr(reference, "derivative_of", lambda *key, wrong=wrong: wrong)
+        monkeypatch.setattr(reference, "compiled_derivative", lambda *key, wrong=wrong: wrong)
         states = checks.random_states(100)
         found = np.array([model.acceleration(1.0, *np.split(y, 2)) for y in states])
         monkeypatch.undo()
@@ -284,7 +286,7 @@ def test_a_ride_lifts_in_both_engines_and_in_copies():
     road = road_path(excitation_of(own, wheels(vehicle)), 20.0, 5e-4)
     runs = [drive_over_road(engine, vehicle, road, 2.0, road_seed=2) for engine in ENGINES[1:]]
     assert np.abs(runs[0].run.positions - runs[1].run.positions).max() < 1e-12
-    load = preloads(vehicle).tyres[vehicle.tyres[0].name]
+    load = static_preloads(vehicle).tyres[vehicle.tyres[0].name]
     force = runs[0].output_values("tyre force front left")
     assert force.min() == pytest.approx(-load) and 0.1 < (force <= -load + 1e-9).mean() < 0.6
     march = CopiesMarch(vehicle, 20.0, road.step, 1)
@@ -313,7 +315,7 @@ def test_routes_of_covariance_refuse_and_name_the_one_in_time():
     with pytest.raises(InputError, match="in small motion no wheel leaves the road"):
         vehicle_of(ride_scene(vehicle={"file": "r19_ride", "operating_point": "loaded", "small_motion": True}))
     with pytest.raises(InputError, match="must bear"):
-        preloads(load_vehicle("half_car").with_tyres(pushes_only=True))  # without gravity
+        static_preloads(load_vehicle("half_car").with_tyres(pushes_only=True))  # without gravity
 
 
 def test_the_answer_of_a_ride_that_lifts_is_that_of_its_copies(tmp_path):

@@ -10,12 +10,12 @@ import pytest
 
 from models.contact.fastsim_grid import ellipse_grid
 from models.contact.linear_theory import kalker_coefficients
-from models.core.systems import of_table
+from models.core.systems import scene_of_table
 from models.engines.native_parts import AxialTravel
 from models.engines.spatial_protocol import EngineKinematics, difference_step
-from models.multibody.numbers import _frame, _put_curves
+from models.multibody.numbers import _last_coordinate_of_frame, _put_curves
 from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART, curve_numbers
-from models.multibody.plain.motion import generator
+from models.multibody.plain.motion import motion_generator
 from models.rail.equations import ROLL, YAW, WheelsetEquations, Y
 from models.rail.linear import (
     _contact_kinematics,
@@ -35,7 +35,7 @@ from models.systems.bicycle.run import bicycle_assumptions
 from models.systems.ride.of_scene import excitation_of, half_track_of, placed_wheels
 from models.systems.ride.watched import SpectralMotion, checked_speeds, static_loads
 from models.systems.wheelset.of_scene import equations_and_start, path_speeds
-from models.vehicles.cut_vehicle import Element
+from models.vehicles.cut_vehicle import CutVehicleElement
 from models.vehicles.free_vehicle import CARRIER
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.linear_vehicle import WheelPosition
@@ -52,7 +52,7 @@ W = CHOSEN_WHEELSET
 
 def test_the_first_travel_of_an_element_is_the_way_from_end_to_end_along_its_axis():
     foot, tip, axis = np.array([0.25, -0.5, 0.75]), np.array([0.5, 0.25, 1.5]), np.array([0.6, 0.0, 0.8])
-    element = Element("a", "body", "fl", foot, tip, axis, 1.0, 0.0, 0.0, "body")
+    element = CutVehicleElement("a", "body", "fl", foot, tip, axis, 1.0, 0.0, 0.0, "body")
     for travel in (element, AxialTravel("body", foot, "fl", tip, axis)):
         assert travel.design == pytest.approx(0.6 * 0.25 + 0.8 * 0.75, rel=1e-12)
 
@@ -81,15 +81,18 @@ def test_points_of_a_body_move_by_its_levers():
 def test_generators_of_skew_axes_move_along_them_and_turn_about_them():
     axes = ((0.6, 0.0, 0.8), (0.0, 1.0, 0.0), (-0.8, 0.0, 0.6))
     point, shifted = np.array([0.5, -0.25, 0.75, 1.0]), np.array([0.6, 0.0, 0.8])
-    assert (generator("x", axes) @ point).tolist() == [*shifted, 0.0]
-    assert (generator("rx", axes) @ point)[:3] == pytest.approx(np.cross(shifted, point[:3]), rel=1e-12)
+    assert (motion_generator("x", axes) @ point).tolist() == [*shifted, 0.0]
+    assert (motion_generator("rx", axes) @ point)[:3] == pytest.approx(np.cross(shifted, point[:3]), rel=1e-12)
 
 
 def test_numbers_of_a_table_that_name_places_are_whole():
     """The last coordinate of a body's joint, and where each curve begins."""
     towed = SimpleNamespace(name="t", towed=("trailer",), coordinates=lambda: (("body", "x"), ("trailer", "x")))
     towed.body = lambda name: SimpleNamespace(position=(0.0, 0.0, 0.0), parent=None)
-    assert _frame(towed, "springs", "trailer") == 1.0 and _frame(towed, "springs", CARRIER) == 0.0
+    assert (
+        _last_coordinate_of_frame(towed, "springs", "trailer") == 1.0
+        and _last_coordinate_of_frame(towed, "springs", CARRIER) == 0.0
+    )
     curve, rows = Curve((-0.5, 0.0, 0.25), (-1.5, 0.5, 2.5)), np.zeros(2 * PER_PART)
     laid, numbers = _put_curves([(None, (None, curve)), (None, (curve, None))], rows, 40), curve_numbers(curve)
     assert laid.tolist() == [*numbers, *numbers]
@@ -109,7 +112,7 @@ def test_filters_of_a_road_are_its_corners_and_the_roots_of_its_intensities():
 def ride_scene(**road):
     """A scene of the shipped car."""
     table = {"title": "t", "system": "ride", "vehicle": {"file": "r19_free"}, "road": road}
-    return of_table({**table, "speeds": {"values": [20.0]}}, "s.toml", Path())
+    return scene_of_table({**table, "speeds": {"values": [20.0]}}, "s.toml", Path())
 
 
 def test_wheels_run_where_the_scene_says():
@@ -256,7 +259,7 @@ def test_a_growth_that_is_written_out_has_its_own_critical_speed():
 def wheelset_scene(**run):
     """A scene of the chosen wheelset."""
     table = {"title": "t", "system": "wheelset", "speeds": {"values": [80.0]}, "run": {"duration": 0.1, **run}}
-    return of_table(table, "s.toml", Path())
+    return scene_of_table(table, "s.toml", Path())
 
 
 def test_paths_of_a_wheelset_begin_where_their_scene_says_at_speeds_about_the_critical_one():

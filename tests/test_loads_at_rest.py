@@ -7,7 +7,7 @@ import pytest
 
 from models.multibody.numbers import GRAVITY, Handling
 from models.systems.handling.run import build_in_engine
-from models.vehicles.spatial_linear import preloads
+from models.vehicles.spatial_linear import static_preloads
 from models.vehicles.vehicle_file import load_vehicle
 
 pytestmark = pytest.mark.grounds("closed form")
@@ -30,7 +30,7 @@ def test_loads_of_the_tyres_balance_the_weight_and_its_moments(vehicle, axis):
     def lever(point):
         return 1.0 if axis is None else point[axis]
 
-    loads = preloads(vehicle).tyres
+    loads = static_preloads(vehicle).tyres
     borne = sum(loads[tyre.name] * lever(tyre.point) for tyre in vehicle.tyres)
     weight = sum(body.mass * GRAVITY * lever(body.position) for body in vehicle.bodies)
     scale = sum(body.mass * GRAVITY for body in vehicle.bodies)

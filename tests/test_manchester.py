@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import RunFailed
-from models.core.result import load
+from models.core.result import load_result
 from validation.contact.manchester_references import contact_of, first_touch
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
@@ -30,7 +30,7 @@ def test_study_saves_patches_of_both_wheels_and_a_figure(twinrig, capsys):
     right = np.genfromtxt("out/A-1_right.csv", delimiter=",", skip_header=1)
     heads = Path("out/A-1_right.csv").read_text().splitlines()[0].split(",")
     assert right[:, heads.index("normal [kN]")].tolist() == [patch["normal"] for patch in found["right"]]
-    saved = load(Path("out/A-1.nc")).data
+    saved = load_result(Path("out/A-1.nc")).data
     assert saved["normal"].sel(wheel="right").values.ravel().tolist() == [patch["normal"] for patch in found["right"]]
     assert np.isnan(saved["normal"].values[0, 1, 1])  # the left wheel has one patch
     # Without friction the vertical parts of the forces are the load; the angle is that at the centre, not of the patch.

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.core.csv_header import find_head, name_and_unit, split_cells
+from models.core.csv_header import find_heads_above_numbers, name_and_unit, split_cells
 from models.core.errors import InputError
 from models.measured.formats import csv_layout, csv_rows, open_source
 from models.measured.formats.csv_layout import clock_heading, is_clock, is_other_clock
@@ -211,5 +211,5 @@ def test_titles_and_comments_are_the_comment_of_the_file(tmp_path):
 
 def test_lines_that_are_no_table_have_no_head():
     lines = [csv_layout.FileLine(1, "time;date", 0, 10), csv_layout.FileLine(2, "Meier;today", 10, 22)]
-    assert find_head(lines, is_clock, ",;\t") == [] and split_cells('"a;b";c', ";") == ["a;b", "c"]
+    assert find_heads_above_numbers(lines, is_clock, ",;\t") == [] and split_cells('"a;b";c', ";") == ["a;b", "c"]
     assert name_and_unit("Fz [N]") == ("Fz", "N")

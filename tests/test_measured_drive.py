@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError, RunFailed
-from models.core.scene_file import parse
+from models.core.scene_file import parse_toml
 from models.systems.handling.following import SPEED_TOLERANCE
 from models.systems.handling.run import run
 from models.systems.handling.scene import HandlingScene, build
@@ -21,7 +21,7 @@ FEW = {"duration": 2.0}
 
 def scene(tyres: dict | None = None, run: dict | None = None, **changes: object) -> HandlingScene:
     """The shipped scene with changes of its manoeuvre."""
-    table = parse(SCENES / "measured_drive.toml")
+    table = parse_toml(SCENES / "measured_drive.toml")
     table["manoeuvres"]["measured"] |= changes
     table["tyres"] |= tyres or {}
     return build(table | {"run": run or {}}, "drive.toml", SCENES)

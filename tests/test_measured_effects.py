@@ -9,7 +9,7 @@ from models.advice.choice.choose import EffectChooser
 from models.advice.choice.systems import measured
 from models.advice.choice.variants import Variants
 from models.core.errors import InputError
-from models.core.result import load as load_result
+from models.core.result import load_result
 from models.core.scene_effects import absent_effects, named_effects, scene_without, with_effects
 from models.core.systems import load
 from models.measured.columns import SampleFile

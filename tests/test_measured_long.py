@@ -10,7 +10,7 @@ from filterpy.kalman import KalmanFilter
 from rainflow import extract_cycles
 
 from models.core.errors import InputError, RunFailed
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.fatigue.counting import counted_load
 from models.fatigue.damage import turning_points
 from models.fatigue.rainflow_cycles import rainflow_cycles
@@ -168,7 +168,7 @@ def test_rows_are_linear_between_samples_and_gyros_become_rates_of_angles(whole)
     values = np.random.default_rng(1).normal(size=(50, 3))
     for step in (1e-3, 5e-4, 2e-3, 2.5e-4):
         count = round(49e-3 / step * 2) + 1 - (step == 2e-3)
-        expected = Sampled(values, 1e-3, held=False).sample(0.0, step / 2, count)
+        expected = SampledSignal(values, 1e-3, held=False).sample(0.0, step / 2, count)
         assert StepGrid(step, 1e-3).rows(values, count) == pytest.approx(expected, abs=1e-12)
     with pytest.raises(InputError, match="part or a multiple"):
         StepGrid(3e-4, 1e-3).check()

@@ -17,7 +17,7 @@ from models.measured.columns import SampleFile, SamplesInMemory
 from models.measured.faults_of_measurement import SimulatedFaults
 from models.measured.recording import Recording
 from models.measured.signal import MeasuredSignal, TransducerPlace
-from models.multibody.cut_table import joints
+from models.multibody.cut_table import joint_table_of
 from models.systems.hub_forces.measurement import element_travels
 from models.systems.measured.hand_on import labelled_result
 from models.systems.measured.inputs import RecordingInputs, StepGrid
@@ -158,7 +158,7 @@ def test_accelerometers_sit_where_the_scene_and_the_vehicle_say():
 
 def test_behind_a_guide_of_a_car_acts_what_the_guided_body_bears():
     """All bodies ride on the chassis: 1 where the body, the hub or an element's end is the guided one, else 0."""
-    last, behind = _guide_arrays(CAR, joints(CAR))
+    last, behind = _guide_arrays(CAR, joint_table_of(CAR))
     coordinates = [body for body, _ in CAR.tree.coordinates()]
     guided = [body.name for body in CAR.uncut.bodies if body.name != "body"]
     heavy = [body.name for body in CAR.tree.bodies if body.mass > 0.0]

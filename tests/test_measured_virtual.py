@@ -24,7 +24,7 @@ from models.systems.measured.verdict import ChannelComparison, FrequencyBand, an
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording_of_samples, virtual_measurement
 from models.systems.measured.virtual import checked_signals as check_virtual
 from models.systems.pitch_plane.run import run as simulate
-from models.vehicles.cut_vehicle import CutVehicle, cut, rigid_vehicle
+from models.vehicles.cut_vehicle import CutVehicle, cut_at_hubs, rigid_vehicle
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.scenes import road_scene
 
@@ -33,7 +33,7 @@ PERIOD = 2e-3
 
 @pytest.fixture(scope="module")
 def car() -> CutVehicle:
-    return cut(load_vehicle("r19_free"), "body")
+    return cut_at_hubs(load_vehicle("r19_free"), "body")
 
 
 @pytest.fixture(scope="module")

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.multibody.numbers import GRAVITY, Handling, Tyres
+from models.multibody.numbers import GRAVITY, Handling, TyreParameters
 from models.systems.handling.run import build_in_engine
 from models.vehicles.kinematics import Kinematics
-from models.vehicles.spatial_linear import preloads
+from models.vehicles.spatial_linear import static_preloads
 from models.vehicles.vehicle_file import load_vehicle
 
 pytestmark = pytest.mark.grounds("closed form")
@@ -19,7 +19,7 @@ SLIDING = np.array([14.0, 4.0, 0.0])
 
 @pytest.fixture(scope="module")
 def car():
-    return Handling(R19, Tyres(cells=11, fixed=tuple(tyre.name for tyre in R19.tyres)))
+    return Handling(R19, TyreParameters(cells=11, fixed=tuple(tyre.name for tyre in R19.tyres)))
 
 
 def forces_on(car):
@@ -27,7 +27,7 @@ def forces_on(car):
 
     Each tyre bears its load at rest, which statics tells (test_loads_at_rest), and rubs against the sliding.
     """
-    loads = preloads(replace(R19, gravity=GRAVITY)).tyres
+    loads = static_preloads(replace(R19, gravity=GRAVITY)).tyres
     against = -SLIDING / np.linalg.norm(SLIDING)
     parts = [
         (np.array([*tyre.point[:2], 0.0]), loads[tyre.name] * (car.tyres.friction * against + [0.0, 0.0, 1.0]))

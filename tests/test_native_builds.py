@@ -7,14 +7,14 @@ import pytest
 
 from models.core.errors import InputError, Refused
 from models.engines.cut_vehicle import build, native_share
-from models.engines.native_parts import NO_CURVE, NO_FRAME, NO_TRAVEL, AxialTravel, divide
+from models.engines.native_parts import NO_CURVE, NO_FRAME, NO_TRAVEL, AxialTravel, divide_between_engine_and_callback
 from models.multibody.cut_table import HubInputs
 from models.systems.hub_forces import run as running
 from models.systems.hub_forces.plan import describe
 from models.systems.hub_forces.run import run
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.measured.sections import Sections
-from models.vehicles.cut_vehicle import cut
+from models.vehicles.cut_vehicle import cut_at_hubs
 from validation.faults.native import CAMPAIGN
 from validation.spatial.cars import r19, rough_car, static_forces, twin
 from validation.spatial.native_builds import (
@@ -37,7 +37,7 @@ def turned():
         else s
         for s in whole.springs
     )
-    return cut(replace(whole, springs=springs), "body")
+    return cut_at_hubs(replace(whole, springs=springs), "body")
 
 
 @pytest.mark.parametrize("engine", NATIVE_ENGINES)
@@ -75,7 +75,7 @@ def test_the_first_evaluation_reads_no_stale_law():
 
 def test_an_axis_fixed_in_what_does_not_carry_the_other_end_stays_shared():
     """A mount in the engine's axes, whose other end is on the chassis, which the engine does not carry."""
-    division = divide(turned().tree, turned().elements, "mujoco")
+    division = divide_between_engine_and_callback(turned().tree, turned().elements, "mujoco")
     assert division.reasons == dict.fromkeys(("left mount.x", "rear mount.z", "front left"), NO_FRAME)
     assert sum(isinstance(part.travel, AxialTravel) for part in division.native) == 7  # of nine of mounts
 
@@ -85,7 +85,9 @@ def test_a_spring_that_nothing_strains_is_no_element():
     car = r19()
     across = replace(car, elements=(*car.elements[:-3], replace(car.elements[-3], axis=np.array([1.0, 0.0, 0.0]))))
     assert car.elements[-3].name == "right seat"
-    assert divide(across.tree, across.elements, "mujoco").reasons == {"right seat": NO_TRAVEL}
+    assert divide_between_engine_and_callback(across.tree, across.elements, "mujoco").reasons == {
+        "right seat": NO_TRAVEL
+    }
     assert native_acceleration_difference("mujoco", across, random_states(across, 2)) < 1e-12
 
 

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.core.scene_effects import extended_by_effects, names_of, rebuilt_scene, table_without_defaults, with_effects
+from models.core.scene_effects import (
+    effect_names_of,
+    extended_by_effects,
+    rebuilt_scene,
+    table_without_defaults,
+    with_effects,
+)
 from models.core.systems import DEFAULT_SYSTEM, SYSTEMS
 from models.systems.pitch_plane.plan import describe
 from models.systems.pitch_plane.run import run as simulate
@@ -64,7 +70,7 @@ def extend(vehicle, p):
 
 def test_a_new_effect_of_the_pitch_plane(new_file, tmp_path, capsys):
     new_file(DEFAULT_SYSTEM, "anchor", ANCHOR)
-    assert "anchor" in names_of(DEFAULT_SYSTEM)
+    assert "anchor" in effect_names_of(DEFAULT_SYSTEM)
     list_scenes()
     assert "A rope that draws the chassis level" in capsys.readouterr().out
     scene = with_effects(absent.scene_with_effects({}, 20, tmp_path), "anchor")
@@ -112,4 +118,4 @@ def test_a_file_that_is_no_effect_is_told_by_name(text, told, new_file, capsys):
 
 def test_the_file_is_all_that_made_it():
     """Control of the fixture: nothing of both is left."""
-    assert "anchor" not in names_of(DEFAULT_SYSTEM) and "slow_chambers" not in names_of("braking")
+    assert "anchor" not in effect_names_of(DEFAULT_SYSTEM) and "slow_chambers" not in effect_names_of("braking")

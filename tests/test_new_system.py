@@ -113,9 +113,9 @@ def test_it_runs_and_saves_a_result(tree):
     done = asked(tree, "run", "stone.toml", "--out", "out")
     assert done.returncode == 0, done.stderr
     assert "falls for 2.019 s" in done.stdout
-    from models.core.result import load
+    from models.core.result import load_result
 
-    saved = load(tree / "out" / "fall.nc")
+    saved = load_result(tree / "out" / "fall.nc")
     assert json.loads(saved.data.attrs["scene_table"])["height"] == 20.0
     assert "commit" in json.loads(saved.data.attrs["provenance"])
 

@@ -14,7 +14,7 @@ from models.engines.protocol import build as in_plane
 from models.engines.spatial_protocol import INTEGRATORS
 from models.engines.spatial_protocol import build as in_space
 from models.systems.handling.run import build_in_engine as on_tyres
-from models.vehicles.cut_vehicle import cut
+from models.vehicles.cut_vehicle import cut_at_hubs
 from models.vehicles.vehicle_file import load_vehicle
 from validation.absence import bare_cars
 from validation.cases.ride_engines import shipped_vehicle_or_twin
@@ -39,7 +39,7 @@ def ride(engine: str) -> tuple[Model, Trajectory]:
 
 
 def hub_forces(engine: str) -> tuple[Model, Trajectory]:
-    vehicle = cut(load_vehicle("r19_free"), "body")
+    vehicle = cut_at_hubs(load_vehicle("r19_free"), "body")
     model = build(engine, vehicle, static_forces(vehicle, 2 * STEPS + 1), STEP, STEPS * STEP)
     moved = 1e-3 * np.random.default_rng(1).standard_normal((2, vehicle.size))
     return model, model.run(*moved)

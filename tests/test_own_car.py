@@ -26,7 +26,7 @@ from models.systems.handling.export import export_handling
 from models.systems.handling.run import REFERENCE_ENGINE, build_in_engine, drive_run
 from models.systems.ride.run import run as run_ride
 from models.tyre.magic_formula import table_of_surface
-from models.vehicles.cut_vehicle import cut
+from models.vehicles.cut_vehicle import cut_at_hubs
 from models.vehicles.free_vehicle import CARRIER
 from models.vehicles.spatial import JointElement, SpatialVehicle
 from models.vehicles.spatial_linear import linearise
@@ -308,7 +308,7 @@ def test_a_car_in_mjcf_is_that_of_a_vehicle_file(tmp_path):
     """The linear vehicles under weight, and what hub forces cut; to rounding."""
     mjcf, toml = twice_written()
     of_mjcf, of_toml = read(tmp_path, mjcf), build_vehicle(tomllib.loads(toml), "car.toml")
-    for first, second in ((of_mjcf, of_toml), (cut(of_mjcf, "body").uncut, cut(of_toml, "body").uncut)):
+    for first, second in ((of_mjcf, of_toml), (cut_at_hubs(of_mjcf, "body").uncut, cut_at_hubs(of_toml, "body").uncut)):
         one, other = (linearise(replace(each, gravity=9.81).in_frame("body"), 20.0) for each in (first, second))
         for name in ("mass", "damping", "stiffness", "road_stiffness"):
             left, right = getattr(one, name), getattr(other, name)
@@ -317,7 +317,7 @@ def test_a_car_in_mjcf_is_that_of_a_vehicle_file(tmp_path):
 
 def test_springs_on_hinges_are_refused_where_springs_lie_between_points(saloon):
     with pytest.raises(InputError, match="joint 'rl swing': is neither along slides of one body"):
-        cut(saloon, "body")
+        cut_at_hubs(saloon, "body")
     with pytest.raises(Refused, match="joint 'fl travel' acts along coordinates"):
         build_spatial("mujoco", saloon)
 

@@ -19,7 +19,7 @@ from models.own_model.builds import (
     SOFT_BUILD,
     equations_of_build,
     equations_of_file,
-    largest_gap,
+    largest_constraint_gap,
     sliding_states,
 )
 from models.own_model.certificate import (
@@ -32,8 +32,8 @@ from models.own_model.certificate import (
 )
 from models.own_model.coordinates import rotation_by_angles
 from models.own_model.elements import distinct_texts, elements_of_model
-from models.own_model.explain import compare, removals_that_agree
-from models.own_model.file import ModelFile, read
+from models.own_model.explain import compare_models, removals_that_agree
+from models.own_model.file import ModelFile, read_model_file
 from models.own_model.limits import limits_struck
 from models.own_model.path import _model_of_build as march_of
 from models.own_model.path import compare_paths
@@ -65,7 +65,7 @@ def _file(folder: Path, text: str, name: str = "a.xml") -> Path:
 
 
 def _read(folder: Path, text: str, name: str = "a.xml", without: tuple[str, ...] = ()) -> ModelFile:
-    return read(_file(folder, text, name), without)
+    return read_model_file(_file(folder, text, name), without)
 
 
 REPELLED = model_with_change(TIED, "rope", 'springlength=".7"', 'springlength="-.01"')
@@ -169,7 +169,7 @@ def test_actuators_that_push_sites_are_those_of_the_file(tmp_path):
         driven = replace(twin.driven, body_loads=(wrong, prop))
         assert all(row.acceleration > 1e-5 for row in certificate(replace(twin, driven=driven), 20))
     other = _read(tmp_path, model_with_change(PUSHED, "prop", "0 0 3 0 0 .4", "0 0 3 0 0 .5"), "b.xml").twin
-    comparison = compare(twin, other, 3)
+    comparison = compare_models(twin, other, 3)
     assert [(each.kind, each.owner) for each in comparison.influential] == [("gear", "actuator 'prop'")]
 
 
@@ -218,9 +218,10 @@ def test_welds_hold_both_bodies_as_they_lie(tmp_path, monkeypatch):
     loop, grip = twin.driven.connections
     turned = replace(grip, axes=(grip.axes[0] @ Rotation.from_rotvec((0.0, 0.02, 0.0)).as_matrix(), grip.axes[1]))
     wrong = replace(twin.driven, connections=(loop, turned))
-    assert all(largest_gap(twin, build, comparison_states(twin, 5)) < 1e-11 for build in ALL_BUILDS)
+    assert all(largest_constraint_gap(twin, build, comparison_states(twin, 5)) < 1e-11 for build in ALL_BUILDS)
     assert all(
-        largest_gap(replace(twin, driven=wrong), build, comparison_states(twin, 5)) > 1e-3 for build in ALL_BUILDS
+        largest_constraint_gap(replace(twin, driven=wrong), build, comparison_states(twin, 5)) > 1e-3
+        for build in ALL_BUILDS
     )
     monkeypatch.setattr("models.own_model.builds.free_model", lambda build, driven: free_model(build, wrong))
     assert [row.alike for row in certificate(twin, 5)] == [False, False, True]
@@ -257,10 +258,10 @@ def test_where_a_joint_between_bodies_lies_is_told(tmp_path):
     second = _read(tmp_path, model_with_change(LINKED, "loop", '"rod"', '"crank"'), "b.xml").twin
     other = _read(tmp_path, model_with_change(LINKED, "grip", 'solimp=".92', 'solimp=".93'), "c.xml").twin
     moved = _read(tmp_path, LINKED.replace('name="tip" pos="0 .3 .1"', 'name="tip" pos="0 .3 .11"'), "d.xml").twin
-    assert not compare(first, second, 3).alike
-    comparison = compare(first, moved, 3)
+    assert not compare_models(first, second, 3).alike
+    comparison = compare_models(first, moved, 3)
     assert [(each.kind, each.owner) for each in comparison.influential] == [("joint", "equality 'grip'")]
-    soft = compare(first, other, 3)
+    soft = compare_models(first, other, 3)
     assert soft.alike and [each.owner for each in soft.not_compared] == ["equality 'grip'"]
 
 
@@ -281,14 +282,14 @@ def test_paths_with_couplings_agree_as_long_as_dry_friction_slides(geared):
     ],
 )
 def test_differences_of_couplings_and_friction_are_named(tmp_path, geared, name, old, new, kind, owner):
-    comparison = compare(geared, _read(tmp_path, model_with_change(GEARED, name, old, new), "b.xml").twin, 5)
+    comparison = compare_models(geared, _read(tmp_path, model_with_change(GEARED, name, old, new), "b.xml").twin, 5)
     assert not comparison.alike and comparison.unexplained_difference < 1e-10
     assert [(each.kind, each.owner) for each in comparison.influential] == [(kind, owner)]
 
 
 def test_softness_of_couplings_is_listed_and_not_compared(tmp_path, geared):
     second = _read(tmp_path, model_with_change(GEARED, "shut", ".95 .99", ".9 .99"), "b.xml").twin
-    comparison = compare(geared, second, 5)
+    comparison = compare_models(geared, second, 5)
     assert comparison.alike and [each.owner for each in comparison.not_compared] == ["equality 'shut'"]
 
 
@@ -301,7 +302,7 @@ def test_ends_of_a_tendon_between_sites_are_told(tmp_path):
     """And the balance of energy and work holds with it."""
     first = _read(tmp_path, TIED)
     second = _read(tmp_path, TIED.replace('pos=".3 .1 -.2"', 'pos=".3 .1 -.21"'), "b.xml")
-    (difference,) = compare(first.twin, second.twin, 3).influential
+    (difference,) = compare_models(first.twin, second.twin, 3).influential
     assert (difference.kind, difference.owner) == ("ends", "tendon 'rope'")
     assert compare_paths(first.twin).energy < 1e-7  # Simpson's rule at 2 ms, on a rope that moves at 6 Hz
 
@@ -355,7 +356,7 @@ def original(tmp_path_factory):
 @pytest.mark.parametrize("name,old,new,kind,owner,size", PLANTED_DIFFERENCES)
 def test_planted_difference_is_named_with_its_size(tmp_path, original, name, old, new, kind, owner, size):
     other = _read(tmp_path, model_with_change(JOINTED, name, old, new), "b.xml")
-    comparison = compare(original.twin, other.twin, 3)
+    comparison = compare_models(original.twin, other.twin, 3)
     assert not comparison.alike
     first = comparison.influential[0]
     said = first.sentence(("a.xml", "b.xml"))
@@ -365,7 +366,7 @@ def test_planted_difference_is_named_with_its_size(tmp_path, original, name, old
 
 def test_difference_without_influence_is_listed_as_such(tmp_path, original):
     text = JOINTED.replace('ctrlrange="1 2"', 'ctrlrange="1 3"')
-    comparison = compare(original.twin, _read(tmp_path, text, "b.xml").twin, 3)
+    comparison = compare_models(original.twin, _read(tmp_path, text, "b.xml").twin, 3)
     assert comparison.alike and comparison.influential == ()
     assert [(each.kind, each.owner) for each in comparison.differences] == [("control range", "actuator 'push'")]
 
@@ -379,20 +380,20 @@ def test_a_difference_in_what_is_off_is_listed_as_not_compared(tmp_path):
         "b.xml",
         ("friction_loss",),
     )
-    comparison = compare(first.twin, second.twin, 3)
+    comparison = compare_models(first.twin, second.twin, 3)
     assert comparison.alike and comparison.silent_differences == ()
     assert {each.kind for each in comparison.not_compared} == {"friction loss", "range"}
 
 
 def test_an_actuator_that_one_file_lacks_explains_the_difference(tmp_path, original):
     text = JOINTED.replace("</actuator>", '<position name="hold" joint="hinge" kp="4"/></actuator>')
-    comparison = compare(original.twin, _read(tmp_path, text, "b.xml").twin, 3)
+    comparison = compare_models(original.twin, _read(tmp_path, text, "b.xml").twin, 3)
     assert {each.owner for each in comparison.influential} == {"actuator 'hold'"}
     assert comparison.unexplained_difference < 1e-10
 
 
 def test_joints_without_a_partner_are_named(tmp_path, original):
-    comparison = compare(original.twin, _read(tmp_path, CART, "cart.xml").twin, 3)
+    comparison = compare_models(original.twin, _read(tmp_path, CART, "cart.xml").twin, 3)
     assert (
         comparison.acceleration_agreement is None
         and "joint 'hinge' of a has no partner" in comparison.unmatched_coordinates
@@ -403,7 +404,7 @@ def test_mjcf_and_urdf_of_the_same_arm(tmp_path):
     """The same arm as MuJoCo itself writes it: its numbers are rounded to six digits there, and no more."""
     arm = _read(tmp_path, ARM_URDF, "arm.urdf")
     mujoco.mj_saveLastXML(str(tmp_path / "arm.xml"), arm.twin.model)
-    comparison = compare(arm.twin, read(tmp_path / "arm.xml").twin, 3)
+    comparison = compare_models(arm.twin, read_model_file(tmp_path / "arm.xml").twin, 3)
     assert comparison.acceleration_agreement is not None and comparison.acceleration_agreement.acceleration < 1e-4
 
 
@@ -503,9 +504,9 @@ def test_content_without_an_equal_is_refused_by_name_and_line(tmp_path, kind, el
         text = text.replace('<joint name="j" axis="0 0 1"/>', "")
     path = _file(tmp_path, text)
     with pytest.raises(InputError) as error:
-        read(path)
+        read_model_file(path)
     assert said in str(error.value) and f"--without {kind}" in str(error.value)
-    file = read(path, (kind,))
+    file = read_model_file(path, (kind,))
     assert [content.kind for content in file.removed_contents] == [kind]
     assert all(row.alike for row in certificate(file.twin, 5))
 
@@ -553,7 +554,7 @@ def test_nothing_outside_is_read_by_an_include_within_an_include(tmp_path, kind)
         x='<mujoco><extension><plugin plugin="mujoco.elasticity.cable"/></extension></mujoco>',
     )
     with pytest.raises(InputError, match=r"a\.xml.*\.\./x\.xml.*must name a file in the folder"):
-        read(main)
+        read_model_file(main)
 
 
 MESH = (
@@ -586,7 +587,7 @@ def test_includes_are_looked_for_where_mujoco_does(tmp_path):
     attached |= {"in__b": sound, "in__sub__b": plugin}
     for texts in (nested, attached):
         with pytest.raises(InputError, match="plugins are code"):
-            read(_nested(tmp_path, **texts))
+            read_model_file(_nested(tmp_path, **texts))
 
 
 @pytest.mark.parametrize(
@@ -633,7 +634,7 @@ def test_a_hundred_spoilt_files_are_answered(tmp_path):
         path = tmp_path / f"spoilt{i}.xml"
         path.write_bytes(bytes(content))
         try:
-            certificate(read(path, ("contact", "equality", "bent_law")).twin, 1)
+            certificate(read_model_file(path, ("contact", "equality", "bent_law")).twin, 1)
         except InputError as error:
             assert path.name in str(error) or "--without" in str(error)
             refused += 1
@@ -672,7 +673,7 @@ def test_a_mass_that_no_force_moves_is_no_silent_difference(tmp_path):
     body = "<body><joint axis='0 1 0' armature='0.1'/><geom size='0.1' mass='1'/></body>"
     wheel = f"<mujoco><worldbody>{body}</worldbody></mujoco>"
     first, second = (_read(tmp_path, wheel.replace("0.1'/><g", f"{size}'/><g"), f"{size}.xml") for size in (0.1, 0.12))
-    comparison = compare(first.twin, second.twin, 3)
+    comparison = compare_models(first.twin, second.twin, 3)
     assert not comparison.alike and [each.kind for each in comparison.influential] == ["armature"]
 
 

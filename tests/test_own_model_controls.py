@@ -6,7 +6,7 @@ import pytest
 from models.core.errors import InputError
 from models.own_model import path as marching
 from models.own_model.control_table import PathSection, constant_sections, read_controls, with_constant_controls
-from models.own_model.file import read
+from models.own_model.file import read_model_file
 from models.own_model.path import FILE_BUILD_NAME, compare_paths
 from models.own_model.states import random_states
 from validation.own_model.files import CART
@@ -33,7 +33,7 @@ TABLE = """time [ms],soft [N],push [N],hold [rad],actuator 3 [m/s]
 def twin(tmp_path):
     (tmp_path / "cart.xml").write_text(DRIVEN)
     (tmp_path / "controls.csv").write_text(TABLE)
-    return read(tmp_path / "cart.xml").twin
+    return read_model_file(tmp_path / "cart.xml").twin
 
 
 def test_every_build_has_the_path_of_the_file_under_its_controls(twin, tmp_path):
@@ -119,10 +119,10 @@ def test_a_row_between_two_steps_is_refused(twin, tmp_path):
 def test_columns_of_one_name_are_refused(tmp_path, name):
     (tmp_path / "cart.xml").write_text(DRIVEN.replace('name="push"', f'name="{name}"'))
     with pytest.raises(InputError, match="rename the model's actuators"):
-        read_controls(tmp_path / "controls.csv", read(tmp_path / "cart.xml").twin.model)
+        read_controls(tmp_path / "controls.csv", read_model_file(tmp_path / "cart.xml").twin.model)
 
 
 def test_a_model_without_actuators_has_no_controls(tmp_path):
     (tmp_path / "cart.xml").write_text(CART)
     with pytest.raises(InputError, match="no actuators"):
-        read_controls(tmp_path / "controls.csv", read(tmp_path / "cart.xml").twin.model)
+        read_controls(tmp_path / "controls.csv", read_model_file(tmp_path / "cart.xml").twin.model)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from models.own_model.explain import compare
-from models.own_model.file import read
+from models.own_model.explain import compare_models
+from models.own_model.file import read_model_file
 from models.own_model.two_paths import compare_two_paths
 from studies.command.twin import _comparison_lines
 
@@ -103,8 +103,8 @@ def test_paths_of_two_files_are_compared_joint_by_joint(tmp_path):
 def _twin(folder, text, name):
     path = folder / name
     path.write_text(text)
-    return read(path).twin
+    return read_model_file(path).twin
 
 
 def _compared(folder, text):
-    return compare(_twin(folder, MODEL, "a.xml"), _twin(folder, text, "b.xml"), 3)
+    return compare_models(_twin(folder, MODEL, "a.xml"), _twin(folder, text, "b.xml"), 3)

@@ -11,7 +11,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.own_model.certificate import certificate
-from models.own_model.file import read
+from models.own_model.file import read_model_file
 from models.own_model.urdf import misread_numbers
 
 LEGS = ("ant", "half_cheetah", "hopper", "humanoid", "humanoidstandup", "walker2d", "walker2d_v5")
@@ -48,13 +48,13 @@ def _path(name: str) -> Path:
 
 @pytest.mark.parametrize("name", MUJOCO)
 def test_mjcf_of_others_is_certified(name):
-    for row in certificate(read(_path(name), OUTSIDE).twin, STATES):
+    for row in certificate(read_model_file(_path(name), OUTSIDE).twin, STATES):
         assert row.acceleration < 1e-10, row
 
 
 @pytest.mark.parametrize("name", URDF)
 def test_urdf_of_others_is_certified_and_nothing_of_it_lost(name):
-    file = read(_path(name), OUTSIDE)
+    file = read_model_file(_path(name), OUTSIDE)
     assert misread_numbers(file) == []
     for row in certificate(file.twin, STATES):
         assert row.acceleration < 1e-10, row
@@ -62,7 +62,7 @@ def test_urdf_of_others_is_certified_and_nothing_of_it_lost(name):
 
 @pytest.mark.parametrize("name", CARS)
 def test_cars_of_others_are_certified(name):
-    file = read(_path(name))
+    file = read_model_file(_path(name))
     assert misread_numbers(file) == [] and "stands on the world" in file.notes[-1]
     for row in certificate(file.twin, FEW_STATES):
         assert row.alike, row
@@ -70,16 +70,16 @@ def test_cars_of_others_are_certified(name):
 
 @pytest.mark.parametrize("name", HANDS)
 def test_hands_of_others_are_certified(name):
-    for row in certificate(read(_path(name), OUTSIDE, _path(ASSETS)).twin, FEW_STATES):
+    for row in certificate(read_model_file(_path(name), OUTSIDE, _path(ASSETS)).twin, FEW_STATES):
         assert row.alike, row
 
 
 def test_an_inertia_that_no_mass_has_is_refused_by_name():
     with pytest.raises(InputError, match="'link_6'"):
-        read(_path(IMPOSSIBLE))
+        read_model_file(_path(IMPOSSIBLE))
 
 
 def test_a_refusal_of_what_xacro_left_names_its_line():
     """It stands in <origin xyz="$(optenv HUSKY_IMU_XYZ ...)">."""
     with pytest.raises(InputError, match=r"husky\.urdf: .*bad format in attribute 'xyz'.*line 97"):
-        read(_path("pybullet_data/husky/husky.urdf"))
+        read_model_file(_path("pybullet_data/husky/husky.urdf"))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.own_model import certificate as certifying
-from models.own_model.builds import SOFT_BUILD, Motion, equations_of_build
+from models.own_model.builds import SOFT_BUILD, StateMotion, equations_of_build
 from models.own_model.certificate import (
     agreement_of_build,
     certificate,
@@ -14,8 +14,8 @@ from models.own_model.certificate import (
     motion_at,
     reference_of_file,
 )
-from models.own_model.explain import compare
-from models.own_model.file import read
+from models.own_model.explain import compare_models
+from models.own_model.file import read_model_file
 from models.own_model.rounding import _with_solver_rounding
 from validation.own_model.files import GEARED
 
@@ -23,7 +23,7 @@ from validation.own_model.files import GEARED
 def _read(folder, text, name="a.xml"):
     path = folder / name
     path.write_text(text)
-    return read(path)
+    return read_model_file(path)
 
 
 def _beside(stiffness: float) -> str:
@@ -38,7 +38,7 @@ def _beside(stiffness: float) -> str:
 def test_no_coordinate_hides_behind_one_that_accelerates_more(tmp_path, monkeypatch, stiffness):
     """Of two files, and of a build that lacks what the other file has; rounding of the light hinge does no harm."""
     first, second = (_read(tmp_path, _beside(k), f"{k}.xml").twin for k in (10.0, stiffness))
-    comparison = compare(first, second, 3)
+    comparison = compare_models(first, second, 3)
     (difference,) = comparison.influential
     assert (
         not comparison.alike
@@ -65,7 +65,7 @@ def test_rounding_is_no_difference(tmp_path, kind):
     first = _read(tmp_path, text).twin
     assert all(row.alike for row in certificate(first, 30))
     second = _read(tmp_path, text.replace('mass="1e-6"', 'mass="1.000001e-6"'), "b.xml").twin
-    comparison = compare(first, second, 5)
+    comparison = compare_models(first, second, 5)
     assert not comparison.alike and [each.kind for each in comparison.influential] == ["mass"]
 
 
@@ -105,13 +105,13 @@ def test_forces_that_cancel_on_an_axis_leave_rounding_that_is_no_difference(tmp_
     twin = _read(tmp_path, text).twin
     assert all(row.alike for row in certificate(twin, 100))
     other = _read(tmp_path, text.replace('"1e-6"', '"1.000001e-6"'), "b.xml").twin
-    assert [each.owner for each in compare(twin, other, 5).influential] == ["joint 'b'"]
+    assert [each.owner for each in compare_models(twin, other, 5).influential] == ["joint 'b'"]
 
 
 def test_solving_rounds_a_light_coordinate_only_where_the_mass_matrix_couples_it():
     """The second coordinate accelerates a million times as much; by hand |M^-1| |M| |a|."""
     none, acceleration = np.zeros(2), np.array([1.0, 1e6])
     for off, expected in ((0.0, acceleration), (0.5, np.array([[5.0, 4.0], [4.0, 5.0]]) / 3.0 @ acceleration)):
-        moved = Motion(np.array([[1.0, off], [off, 1.0]]), none, acceleration)
-        solved = _with_solver_rounding(Motion(np.zeros((2, 2)), none, none), moved)
+        moved = StateMotion(np.array([[1.0, off], [off, 1.0]]), none, acceleration)
+        solved = _with_solver_rounding(StateMotion(np.zeros((2, 2)), none, none), moved)
         assert solved.acceleration == pytest.approx(expected, rel=1e-12)

@@ -9,7 +9,7 @@ from models.core.errors import InputError
 from models.own_model.builds import sliding_states
 from models.own_model.certificate import certificate, comparison_states
 from models.own_model.constraints import plain_constraints
-from models.own_model.file import read
+from models.own_model.file import read_model_file
 from models.own_model.limits import limits_struck
 from models.own_model.path import FILE_BUILD_NAME, compare_paths, start_of_path
 from models.own_model.states import file_limits
@@ -68,7 +68,7 @@ IDS = ("axis", "geared down", "stuck", "rotors", "gripper", "turned", "knobs")
 def _twin(folder, text):
     path = folder / "a.xml"
     path.write_text(text)
-    return read(path).twin
+    return read_model_file(path).twin
 
 
 @pytest.mark.parametrize("text", [ALMOST_X, GEARED_DOWN, STUCK, ROTORS, GRIPPER, ALMOST_TURNED, KNOBS], ids=IDS)
@@ -102,12 +102,12 @@ def test_one_refusal_names_all_that_has_no_equal_and_its_option_helps(tmp_path):
     path = tmp_path / "a.xml"
     path.write_text(MUSCLED)
     with pytest.raises(InputError) as error:
-        read(path)
+        read_model_file(path)
     said = str(error.value)
     assert "geom 'floor' (a.xml:2)" in said and "actuator 'm' (a.xml:4)" in said
     kinds = re.search(r"They have no equal .* with `--without ([\w,]+)`", said)
     assert kinds and kinds[1] == "contact,actuator"
-    twin = read(path, kinds[1].split(",")).twin
+    twin = read_model_file(path, kinds[1].split(",")).twin
     assert compare_paths(twin).alike and set(compare_paths(twin).distances) == {"mujoco", "plain", FILE_BUILD_NAME}
 
 
@@ -116,7 +116,7 @@ def test_a_refusal_of_deformable_bodies_offers_no_option(tmp_path, without):
     path = tmp_path / "a.xml"
     path.write_text(SHEET)
     with pytest.raises(InputError, match=r"sheet.*cannot be left out") as error:
-        read(path, without)
+        read_model_file(path, without)
     assert "--without" not in str(error.value)
 
 

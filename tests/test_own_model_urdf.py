@@ -6,7 +6,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.own_model.certificate import certificate
-from models.own_model.file import read
+from models.own_model.file import read_model_file
 from models.own_model.urdf import misread_numbers
 
 BOX = '<geometry><box size=".1 .2 .3"/></geometry>'
@@ -48,13 +48,13 @@ def _file(folder, text, name="a.urdf"):
 
 def _refusal(path, **options):
     with pytest.raises(InputError) as error:
-        read(path, **options)
+        read_model_file(path, **options)
     return str(error.value)
 
 
 def test_what_other_programs_read_is_passed_over_and_told(tmp_path):
     """Nor does a link that stands need an inertia that a mass can have, or a drawn shape its file."""
-    file = read(_file(tmp_path, ROBOT))
+    file = read_model_file(_file(tmp_path, ROBOT))
     assert "moves nothing here: 1 <gazebo>, 1 <transmission>" in " ".join(file.notes)
     assert "link 'base' stands on the world" in " ".join(file.notes)
     assert misread_numbers(file) == [] and all(row.alike for row in certificate(file.twin, 5))
@@ -73,7 +73,7 @@ def test_what_other_programs_read_is_passed_over_and_told(tmp_path):
 )
 def test_refusals_name_the_line_of_the_file(tmp_path, old, new, said):
     path = _file(tmp_path, ROBOT.replace(old, new))
-    assert said in _refusal(path) if said else read(path).twin.size == 1
+    assert said in _refusal(path) if said else read_model_file(path).twin.size == 1
 
 
 @pytest.mark.parametrize("text,asked", [(NO_MASS, "balanceinertia"), (EMPTY, "boundmass")], ids=["inertia", "mass"])
@@ -82,17 +82,19 @@ def test_what_a_refusal_of_the_parser_says_helps(tmp_path, text, asked):
     compiler = re.search(r"<compiler .*?/>", said)
     assert compiler and asked in compiler[0] and "within a <mujoco> below <robot>" in said and "spec" not in said
     path = _file(tmp_path, text.replace("<gazebo>", f"<mujoco>{compiler[0]}</mujoco><gazebo>"))
-    assert all(row.alike for row in certificate(read(path).twin, 5))
+    assert all(row.alike for row in certificate(read_model_file(path).twin, 5))
 
 
 def test_a_link_without_a_joint_is_set_free_as_the_refusal_says(tmp_path):
     assert "a joint of type floating, from a link before it, sets it free" in _refusal(_file(tmp_path, BALL))
     joint = '<link name="w"/><joint name="j" type="floating"><parent link="w"/><child link="ball"/></joint></robot>'
-    assert read(_file(tmp_path, BALL.replace("</robot>", joint))).twin.size == 6
+    assert read_model_file(_file(tmp_path, BALL.replace("</robot>", joint))).twin.size == 6
 
 
 def test_masses_that_mujoco_makes_of_shapes_are_told(tmp_path):
-    assert "link 'arm' without <inertial>: MuJoCo takes 1000 kg/m^3" in " ".join(read(_file(tmp_path, SHAPED)).notes)
+    assert "link 'arm' without <inertial>: MuJoCo takes 1000 kg/m^3" in " ".join(
+        read_model_file(_file(tmp_path, SHAPED)).notes
+    )
 
 
 def test_shapes_are_looked_for_beside_the_file(tmp_path, monkeypatch):
@@ -101,7 +103,7 @@ def test_shapes_are_looked_for_beside_the_file(tmp_path, monkeypatch):
         _file(tmp_path, CORNERS.replace("1", str(size)) if size > 1 else CORNERS, f"{folder}/m.obj")
     path = _file(tmp_path, MESHED, "in/a.urdf")
     monkeypatch.chdir(tmp_path / "elsewhere")
-    assert read(path).twin.model.body_mass[1] == pytest.approx(1000.0 / 6.0)
+    assert read_model_file(path).twin.model.body_mass[1] == pytest.approx(1000.0 / 6.0)
     (tmp_path / "in" / "m.obj").unlink()
     assert "What shapes need must lie beside the model" in _refusal(path)
 
@@ -119,8 +121,8 @@ def test_a_folder_above_is_read_where_the_user_names_it(tmp_path):
     _file(tmp_path, f"<mujoco>{body}</mujoco>", "parts/b.xml")
     path = _file(tmp_path, '<mujoco><include file="../parts/b.xml"/></mujoco>', "models/a.xml")
     assert f"`--folder {tmp_path}`" in _refusal(path)
-    assert read(path, allowed_folder=tmp_path).twin.size == 1
-    assert "must be a folder that holds" in _refusal(path, folder=tmp_path / "parts")
+    assert read_model_file(path, allowed_folder=tmp_path).twin.size == 1
+    assert "must be a folder that holds" in _refusal(path, allowed_folder=tmp_path / "parts")
     path = _file(tmp_path, '<mujoco><include file="/x.xml"/></mujoco>', "models/a.xml")
     assert "--folder" not in _refusal(path)
     path = _file(tmp_path, '<mujoco><include file="gone.xml"/></mujoco>', "models/a.xml")

@@ -17,7 +17,7 @@ from models.drift.score import low_pass, root_mean_square
 from models.multibody.numbers import Handling
 from models.road.iso8608 import level_of_class
 from models.road.plane_waves import plane_waves
-from models.vehicles.free_vehicle import joints, last_coordinate_and_joint
+from models.vehicles.free_vehicle import joint_table, last_coordinate_and_joint
 from models.vehicles.vehicle_file import load_vehicle
 
 pytestmark = pytest.mark.grounds("closed form")
@@ -152,7 +152,7 @@ def test_a_car_rolls_straight_ahead_under_the_weight_of_its_slope():
 def test_arms_from_joint_to_joint_end_where_each_body_is():
     """The sum of all arms below a coordinate is the design position of its body."""
     car = Handling(load_vehicle("r19_free")).vehicle
-    rows, ends = joints(car), list[np.ndarray]()
+    rows, ends = joint_table(car), list[np.ndarray]()
     for _, below, *arm in rows:
         ends.append(np.array(arm) + (ends[int(below)] if below >= 0.0 else 0.0))
     for (name, _), end in zip(car.coordinates(), ends, strict=True):

@@ -14,7 +14,7 @@ from models.multibody.plain.motion import FIRST_DERIVATIVE, PLACE, RATE, Bodies
 from models.multibody.plain.parts import PlainParts
 from models.multibody.plain.statics import preloads_at_rest
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import mass, preloads
+from models.vehicles.spatial_linear import design_mass_matrix, static_preloads
 from models.vehicles.vehicle_file import load_vehicle
 from validation.spatial.cars import twin
 from validation.spatial.spatial_twin import asymmetric_vehicle as spatial_twin
@@ -50,7 +50,7 @@ def test_a_mass_matrix_at_rest_is_that_of_small_motion():
     still = np.zeros(len(whole.coordinates()))
     bodies = Bodies(whole)
     matrix, force = bodies.inertia(bodies.move(still, still), np.zeros(3))
-    assert matrix == pytest.approx(mass(whole), abs=ROUNDING * mass(whole).max())
+    assert matrix == pytest.approx(design_mass_matrix(whole), abs=ROUNDING * design_mass_matrix(whole).max())
     assert np.abs(force).max() == 0.0
 
 
@@ -87,7 +87,7 @@ def test_a_moment_does_the_work_of_its_angular_velocity(body):
 def test_preloads_are_those_of_the_description(car):
     car = replace(car, gravity=9.81, side_forces=(), drags=())
     held, loads = preloads_at_rest(car, None)
-    wanted = preloads(car)
+    wanted = static_preloads(car)
     assert held == pytest.approx([*wanted.parts.values()], abs=1e-9)
     assert loads == pytest.approx([*wanted.tyres.values()], rel=1e-12)
 

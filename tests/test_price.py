@@ -11,7 +11,7 @@ from models.advice.price import curves
 from models.advice.price import runner as cost
 from models.advice.price.problem import Setting
 from models.core.errors import Refused, RunFailed
-from models.machine.timing import describe, interleave, paired_ratio
+from models.machine.timing import interleave, paired_ratio, timing_statistics
 from validation.price.rows import rows_of
 from validation.price.tables import rounds_sentence, tables
 
@@ -350,7 +350,7 @@ def test_interleaving_runs_every_job_in_every_round():
 
 
 def test_description_of_seconds():
-    assert describe([3.0, 1.0, 2.0, 10.0, 2.0]) == {"median": 2.0, "mad": 1.0, "min": 1.0}
+    assert timing_statistics([3.0, 1.0, 2.0, 10.0, 2.0]) == {"median": 2.0, "mad": 1.0, "min": 1.0}
 
 
 def test_force_calls_seen_from_outside():

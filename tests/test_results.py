@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from models.core.errors import InputError
-from models.core.result import Result, load
+from models.core.result import Result, load_result
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 
@@ -18,7 +18,7 @@ ROAD = {"title": "test", "run": {"duration": 0.5, "step": 1e-3}, "effects": STUD
 def test_every_channel_has_unit_and_meaning(tmp_path):
     result = simulate(build(ROAD), "reference")
     result.save(tmp_path / "run.nc")
-    back = load(tmp_path / "run.nc")
+    back = load_result(tmp_path / "run.nc")
     for channel in back.data.data_vars.values():
         assert channel.attrs["units"] and channel.attrs["long_name"]
     assert np.array_equal(back.states, result.states)
@@ -32,7 +32,7 @@ def test_two_runs_leave_the_same_bytes(tmp_path):
         assert result.data.attrs["seconds"] > 0.0
         result.save(tmp_path / name)
     assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
-    assert "seconds" not in load(tmp_path / "a.nc").data.attrs
+    assert "seconds" not in load_result(tmp_path / "a.nc").data.attrs
 
 
 def test_the_saved_scene_gives_the_same_numbers(tmp_path):
@@ -65,7 +65,7 @@ def test_wheel_forces_carry_the_vehicle_on_average():
 def test_a_file_that_is_no_result_is_named(tmp_path):
     (tmp_path / "x.nc").write_text("hello")
     with pytest.raises(InputError, match="not a saved result"):
-        load(tmp_path / "x.nc")
+        load_result(tmp_path / "x.nc")
 
 
 def test_a_result_with_one_bit_flipped_is_refused(tmp_path):
@@ -78,7 +78,7 @@ def test_a_result_with_one_bit_flipped_is_refused(tmp_path):
         for place in range(begin, begin + 512, 101):
             (tmp_path / "x.nc").write_bytes(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :])
             with pytest.raises(InputError, match="damaged"):
-                load(tmp_path / "x.nc")
+                load_result(tmp_path / "x.nc")
 
 
 def test_headers_that_HDF5_finds_damaged_are_refused_as_well(tmp_path):
@@ -89,4 +89,4 @@ def test_headers_that_HDF5_finds_damaged_are_refused_as_well(tmp_path):
     content[content.index(b"FRHP") + 6] ^= 4
     (tmp_path / "x.nc").write_bytes(content)
     with pytest.raises(InputError, match="damaged"):
-        load(tmp_path / "x.nc")
+        load_result(tmp_path / "x.nc")

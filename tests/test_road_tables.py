@@ -17,7 +17,7 @@ def read(tmp_path, text, **options):
 
 
 def test_units_are_converted_once(tmp_path):
-    table = read(tmp_path, GOOD, increasing="time")
+    table = read(tmp_path, GOOD, increasing_column="time")
     assert list(table) == ["time", "front", "rear"]
     np.testing.assert_array_equal(table["time"], [0.0, 0.5])
     np.testing.assert_array_equal(table["front"], [1.0, 3.5])
@@ -53,7 +53,7 @@ def test_order_of_columns_line_ends_and_byte_order_mark_do_not_matter(tmp_path):
 def test_every_fault_names_its_place(tmp_path, old, new, parts):
     assert old in GOOD
     with pytest.raises(InputError) as caught:
-        read(tmp_path, GOOD.replace(old, new), increasing="time")
+        read(tmp_path, GOOD.replace(old, new), increasing_column="time")
     for part in ["forces.csv", *parts]:
         assert part in str(caught.value)
 
@@ -66,7 +66,7 @@ def test_files_without_a_table_are_refused(tmp_path, text):
 
 def test_too_few_rows_and_missing_files_are_refused(tmp_path):
     with pytest.raises(InputError, match="rows = 2: at least 4"):
-        read(tmp_path, GOOD, least_rows=4)
+        read(tmp_path, GOOD, least_row_count=4)
     with pytest.raises(InputError, match="No such file"):
         tables.read_table(tmp_path / "absent.csv", FORCES)
     with pytest.raises(InputError, match="cannot be read"):

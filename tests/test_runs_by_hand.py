@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.core.systems import of_table
+from models.core.systems import scene_of_table
 from models.core.time_series import write_time_series
 from models.engines.cut_vehicle import HubModel
 from models.road.iso8608 import iso8608_road, random_phases
@@ -39,7 +39,7 @@ R19 = load_vehicle("r19_free")
 def plane_run(engine, start=None, effects=None, duration=0.02):
     """A run of the asymmetric vehicle in the pitch plane in steps of 1 ms."""
     table = {"title": "t", "vehicle": {"parameters": "asymmetric_twin"}, "run": {"duration": duration, "step": 1e-3}}
-    return run(of_table({**table, "start": start or {}, "effects": effects or {}}, "s.toml", Path()), engine)
+    return run(scene_of_table({**table, "start": start or {}, "effects": effects or {}}, "s.toml", Path()), engine)
 
 
 @pytest.mark.parametrize("engine", PLANE_ENGINES)
@@ -115,7 +115,7 @@ def turn(**changes):
     """A car on a flat road, 20 ms, its front wheels and all brakes at once at their values."""
     manoeuvre = {"speed": 20.5, "duration": 0.02, "steer": [[0.0, 0.02]], "brake": [[0.0, 1000.0]], "front_brake": 0.7}
     table = {"title": "t", "system": "handling", "tyres": {"cells": 5, "cornering": [1.25, 0.75]}}
-    return of_table({**table, "manoeuvres": {"turn": {**manoeuvre, **changes}}}, "s.toml", Path())
+    return scene_of_table({**table, "manoeuvres": {"turn": {**manoeuvre, **changes}}}, "s.toml", Path())
 
 
 @pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
@@ -155,7 +155,7 @@ GRAVITY = 9.81
 def test_hub_forces_of_a_file_move_the_centre_of_mass_as_they_would_a_point(engine, tmp_path):
     """Four forces up, 4 kN and 500 N u^2 by the time u (1 at the end) at the samples, lines between them."""
     write(tmp_path)
-    result = run(of_table(BARE_SCENE, "s.toml", tmp_path), engine, method="none")
+    result = run(scene_of_table(BARE_SCENE, "s.toml", tmp_path), engine, method="none")
     samples = 4.0 * (4e3 + 500.0 * np.linspace(0.0, 1.0, round(STEP_COUNT * STEP / SAMPLE_PERIOD) + 1) ** 2)
     time, dense = STEP * STEP_COUNT, 4001
     fine = np.linspace(0.0, time, dense)
@@ -175,13 +175,13 @@ def test_angles_of_a_file_are_those_of_the_run_that_is_held_to_them(tmp_path):
     held = {"roll": 0.02, "pitch": -0.01, "roll_rate": 0.0, "pitch_rate": 0.0}
     columns = {name: (unit, held[name] * still) for name, unit in units.items()}
     write_time_series(tmp_path / "angles.csv", columns, SAMPLE_PERIOD)
-    result = run(of_table(BARE_SCENE, "s.toml", tmp_path), "reference", method="prescribed")
+    result = run(scene_of_table(BARE_SCENE, "s.toml", tmp_path), "reference", method="prescribed")
     assert result["roll"] == pytest.approx(0.02, rel=1e-9) and result["pitch"] == pytest.approx(-0.01, rel=1e-9)
 
 
 @pytest.mark.parametrize("engine", CUT_ENGINES)
 def test_at_rest_on_the_road_hubs_bear_the_vehicle_and_mounts_what_they_carry(engine):
-    scene = of_table({**BARE_SCENE, **ON_ROAD}, "s.toml", Path())
+    scene = scene_of_table({**BARE_SCENE, **ON_ROAD}, "s.toml", Path())
     measured = measure(scene, engine)
     first = measured.forces.samples[0].reshape(len(HUBS), 6)
     assert first[:, 2].sum() == pytest.approx(CUT_MASS * GRAVITY, rel=1e-9)
@@ -203,7 +203,7 @@ def test_the_filter_of_a_scene_is_told_the_deviations_of_its_scene_and_forces_th
     table = {**BARE_SCENE, **ON_ROAD, "effects": {"lift_off": {}}}
     table["forces"] = {"frame": "inertial", "noise": "none", "force_deviation": 8.5, "moment_deviation": 1.5}
     table["angles"] = {"noise": "none", "angle_deviation": 2.5e-3, "rate_deviation": 4.5e-3}
-    scene = of_table(table, "s.toml", Path())
+    scene = scene_of_table(table, "s.toml", Path())
     measured = measure(scene, "reference")
     first = measured.forces.samples[0].reshape(len(HUBS), 6)
     assert first[:, 2].sum() == pytest.approx(CUT_MASS * GRAVITY, rel=1e-9)
@@ -217,7 +217,7 @@ def test_noise_of_hub_forces_and_angles_has_the_deviations_of_its_scene():
     table = {**BARE_SCENE, "road": {}, "run": {"duration": 1.0, "step": 1e-3}}
     noisy = {"frame": "inertial", "sampling_rate": 1000.0, "force_deviation": 80.0, "moment_deviation": 20.0}
     table["angles"] = {"angle_deviation": 0.02, "rate_deviation": 0.3}
-    measured = measure(of_table({**table, "forces": noisy}, "s.toml", Path()), "reference")
+    measured = measure(scene_of_table({**table, "forces": noisy}, "s.toml", Path()), "reference")
     forces, angles = recorded_measurement(measured.truth, "inertial", 1)
     noise = (measured.forces.samples - forces.samples).reshape(-1, len(HUBS), 2, 3)
     angles = (measured.angles.samples - angles.samples).reshape(-1, 2, 2)

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from models.core.result import load
+from models.core.result import load_result
 from studies.command.asked import SCENES_FOLDER, checked_study, load_scene, requested_engines
 from validation.replay.jobs import SHORT_RUN_SETTINGS
 
@@ -37,7 +37,7 @@ def test_every_netcdf_is_a_result_of_its_scene(name: str, tmp_path: Path):
     saved = saved_by_studies(name) or saved_by_short_run(scene, tmp_path)
     assert saved, "a study leaves at least one result"
     for path in saved:
-        said = load(path).data.attrs
+        said = load_result(path).data.attrs
         assert json.loads(said["scene_table"])["title"] == scene.title, path.name
         assert said["title"].startswith(scene.title), path.name  # what is added names the procedure
         assert json.loads(said["provenance"])["twinrig"], path.name

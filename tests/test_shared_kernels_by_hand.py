@@ -8,8 +8,8 @@ from numpy.polynomial import polynomial
 
 from models.brake.brake import Brake, brakes_of_wheels
 from models.brake.controllers.five_phase_cycle import CycleWheelState, time_to_corner
-from models.core.piecewise import evaluate, interpolate
-from models.multibody.tree import add, cross, dot, plus, times
+from models.core.piecewise import interpolated_rows, piecewise_values
+from models.multibody.tree import add_three, cross, dot, plus, times
 from models.road.kernels import cubics_uniform
 
 pytestmark = pytest.mark.grounds("closed form")
@@ -36,7 +36,7 @@ def test_corners_of_the_brake_s_loop_lie_where_its_two_lines_meet_the_torque():
 def test_pieces_of_a_polynomial_and_their_derivatives():
     """Cubic pieces of two columns, 0.5 s long, by numpy's polynomials; the last one goes on beyond its end."""
     coefficients = np.random.default_rng(1).normal(size=(4, 3, 2))
-    computed = evaluate(coefficients, 0.5, 0.11, 0.3, 7, 2)
+    computed = piecewise_values(coefficients, 0.5, 0.11, 0.3, 7, 2)
     for row, time in enumerate(0.11 + 0.3 * np.arange(7)):
         piece = min(int(time / 0.5), 2)
         for order in range(3):
@@ -48,7 +48,7 @@ def test_pieces_of_a_polynomial_and_their_derivatives():
 def test_lines_between_samples():
     values = np.random.default_rng(2).normal(size=(5, 2))
     index, part = np.array([0, 2, 3, 4]), np.array([0.25, 0.5, 0.75, 0.5])
-    computed = interpolate(values, index, part)
+    computed = interpolated_rows(values, index, part)
     for column in range(2):
         assert computed[:, column] == CLOSE(np.interp(index + part, np.arange(5), values[:, column]), rel=ROUNDING)
 
@@ -70,5 +70,5 @@ def test_vectors_of_three_numbers():
     assert cross(left, right) == CLOSE(tuple(np.cross(a, b)), rel=1e-13)
     assert times(left, 0.7) == CLOSE(tuple(0.7 * a)) and plus(left, right) == CLOSE(tuple(a + b))
     numbers = np.arange(6.0)
-    add(numbers, 2, left)
+    add_three(numbers, 2, left)
     assert numbers == CLOSE(np.arange(6.0) + np.array([0, 0, *a, 0]))

@@ -22,7 +22,7 @@ from models.vehicles.spatial import (
     Tyre,
     TyreOutput,
 )
-from models.vehicles.spatial_linear import linearise, preloads
+from models.vehicles.spatial_linear import linearise, static_preloads
 from models.vehicles.vehicle_file import load_vehicle
 
 STEP = 1e-3
@@ -167,7 +167,7 @@ def hessian(function, n):
 @pytest.fixture(scope="module")
 def loaded():
     vehicle = twin()
-    held = preloads(vehicle)
+    held = static_preloads(vehicle)
     # a tyre's preload pushes up: against its rise
     forces = [held.parts[p.name] for p in (*vehicle.springs, *vehicle.bars)] + [
         -held.tyres[t.name] for t in vehicle.tyres
@@ -244,7 +244,7 @@ def test_outputs_and_road(loaded):
 
 @pytest.mark.grounds("closed form")
 def test_wheel_loads_carry_the_weight():
-    held = preloads(replace(load_vehicle("three_axle_truck"), gravity=9.81))
+    held = static_preloads(replace(load_vehicle("three_axle_truck"), gravity=9.81))
     vehicle = load_vehicle("three_axle_truck")
     weight = 9.81 * sum(body.mass for body in vehicle.bodies)
     assert sum(held.tyres.values()) == pytest.approx(weight, rel=1e-12)
@@ -344,4 +344,4 @@ def test_weight_that_nothing_carries():
     vehicle = load_vehicle("quarter_car")
     spring = replace(vehicle.springs[0], stiffness=0.0)
     with pytest.raises(InputError, match=r"body.z: no spring carries the weight"):
-        preloads(replace(vehicle, springs=(spring,), gravity=9.81))
+        static_preloads(replace(vehicle, springs=(spring,), gravity=9.81))

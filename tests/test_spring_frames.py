@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError, Refused
-from models.core.scene_file import parse
+from models.core.scene_file import parse_toml
 from models.engines.spatial_protocol import build, jacobian
 from models.engines.spatial_reference import SpatialReference
 from models.multibody.numbers import Handling
-from models.vehicles.cut_vehicle import cut
+from models.vehicles.cut_vehicle import cut_at_hubs
 from models.vehicles.free_vehicle import CARRIER, free_vehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import SHIPPED_FOLDER, build_vehicle, load_vehicle
@@ -26,11 +26,11 @@ def test_every_system_names_its_frame():
     car = load_vehicle("r19_free")
     assert _frames(car) == {None}
     assert _frames(free_vehicle(car)) == {CARRIER}
-    assert _frames(cut(car, "body").uncut) == {"body"}
+    assert _frames(cut_at_hubs(car, "body").uncut) == {"body"}
 
 
 def _with_frame(frame):
-    table = parse(SHIPPED_FOLDER / "r19_free.toml")
+    table = parse_toml(SHIPPED_FOLDER / "r19_free.toml")
     table["springs"][0]["frame"] = table["mounts"][0]["frame"] = frame
     return build_vehicle(table, "car.toml")
 
@@ -57,7 +57,7 @@ def test_the_closed_form_knows_frames():
 
     Loaded, so that preloads turn with the frame. Differences of order six err by 1e-13 at 2e-3.
     """
-    loaded = replace(cut(twin(), "body").uncut, side_forces=(), bars=())
+    loaded = replace(cut_at_hubs(twin(), "body").uncut, side_forces=(), bars=())
     moved = tuple(
         replace(s, second_point=tuple(np.add(s.second_point, (0.1, -0.2, 0.3))), frame="engine" if i % 2 else "body")
         for i, s in enumerate(loaded.springs)

@@ -33,7 +33,11 @@ def test_all_rows_pass_and_their_ids_are_their_own(measured):
 
 @pytest.mark.parametrize(
     ("module", "model", "engine"),
-    [(reference, "Reference", "reference"), (mujoco, "MujocoModel", "mujoco"), (exudyn, "ExudynModel", "exudyn")],
+    [
+        (reference, "PitchPlaneReference", "reference"),
+        (mujoco, "MujocoModel", "mujoco"),
+        (exudyn, "ExudynModel", "exudyn"),
+    ],
 )
 def test_a_force_without_its_sign_fails_its_rows(monkeypatch, tmp_path, module, model, engine):
     """The enforced force upward instead of down: both vehicles' rows of that implementation, and no other row."""

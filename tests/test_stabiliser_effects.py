@@ -11,7 +11,7 @@ from models.core.time_series import write_time_series
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import RECOMMENDED
 from models.engines.protocol import build
-from models.engines.stability import first_order, linearised, step_matrix
+from models.engines.stability import first_order, linearised_matrices, step_matrix
 from models.systems.pitch_plane.plan import describe
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assembly_of_scene
@@ -180,7 +180,7 @@ def test_a_high_pass_is_the_spring_of_its_corner(forces):
 def test_a_high_pass_decays_as_declared(forces):
     """The slow pair of poles of the force-excited vehicle is that of the filter, softened by the struts by 1 %."""
     vehicle = driven(forces, geometry="linear", high_pass={"cut_off": 0.5, "damping_ratio": 0.6}).vehicle
-    poles = np.linalg.eigvals(first_order(linearised(vehicle)))
+    poles = np.linalg.eigvals(first_order(linearised_matrices(vehicle)))
     slow = poles[np.abs(np.abs(poles) - np.pi) < 1.0]
     assert np.abs(slow) == pytest.approx([np.pi, np.pi], rel=0.01)
     assert -slow.real == pytest.approx([0.6 * np.pi, 0.6 * np.pi], rel=0.01)
@@ -315,14 +315,14 @@ def linear_map(engine, own, integrator, free):
 def test_the_step_check_knows_a_taut_dead_band(forces, engine, integrator):
     """Beyond its band the spring stiffens the vehicle; its damper is in a callback, so implicit in no integrator."""
     own = driven(forces, geometry="linear", pitch_spring={"stiffness": 5e4, "damping": 3e3, "dead_band": 0.1})
-    wanted = step_matrix(integrator, STEP, linearised(own.vehicle))
+    wanted = step_matrix(integrator, STEP, linearised_matrices(own.vehicle))
     assert np.abs(linear_map(engine, own, integrator, range(4)) - wanted).max() < 1e-7  # differences of 1e-5
 
 
 @pytest.mark.parametrize(("engine", "integrator"), [("reference", "RK4"), ("mujoco", "Euler")])
 def test_the_step_check_knows_a_vehicle_on_rails(guided, engine, integrator):
     own = on_rails(guided, geometry="linear")
-    wanted = step_matrix(integrator, STEP, linearised(own.vehicle, own.guided))
+    wanted = step_matrix(integrator, STEP, linearised_matrices(own.vehicle, own.guided))
     assert np.abs(linear_map(engine, own, integrator, range(2)) - wanted).max() < 1e-7
 
 

@@ -67,7 +67,7 @@ def test_what_has_two_meanings_is_refused_with_its_place(tmp_path, text, says):
 
 def test_marks_are_gaps_where_gaps_are_allowed(tmp_path):
     text = GERMAN.replace("3,0;", "--;").replace("4,5;", "n/a;")
-    found = table(tmp_path, text, gaps=True)["left"]
+    found = table(tmp_path, text, allows_gaps=True)["left"]
     assert np.flatnonzero(np.isnan(found)).tolist() == [2, 3]
 
 

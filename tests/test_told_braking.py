@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.core.assumptions import broken_of
-from models.core.discretisation import errors_of
-from models.core.scene_file import parse
+from models.core.assumptions import broken_assumptions_of
+from models.core.discretisation import error_estimates_of
+from models.core.scene_file import parse_toml
 from models.systems.braking import errors
 from models.systems.braking.errors import motion_and_distance, observed_order_of_stop
 from models.systems.braking.of_scene import merged_tables
@@ -72,19 +72,21 @@ def scene(*changes):
 
 def shipped(file):
     path = SCENES / f"{file}.toml"
-    return build(parse(path), path.name, path.parent)
+    return build(parse_toml(path), path.name, path.parent)
 
 
 @pytest.mark.parametrize("name", PLANTED)
 def test_what_is_broken_is_told_with_its_remedy_and_gone_with_it(name):
     change, cure, word = PLANTED[name]
-    told = {one.name: one for one in broken_of(run(scene(change), ENGINES.get(name, "reference")))}
+    told = {one.name: one for one in broken_assumptions_of(run(scene(change), ENGINES.get(name, "reference")))}
     assert name in told and word in told[name].remedy and 0.0 < told[name].share <= 1.0
-    assert name not in {one.name for one in broken_of(run(scene(change, cure), ENGINES.get(name, "reference")))}
+    assert name not in {
+        one.name for one in broken_assumptions_of(run(scene(change, cure), ENGINES.get(name, "reference")))
+    }
 
 
 def test_the_plain_stop_keeps_to_everything_and_show_lists_it():
-    assert broken_of(run(scene())) == [] and describe(scene()).count("  assumes ") >= 6
+    assert broken_assumptions_of(run(scene())) == [] and describe(scene()).count("  assumes ") >= 6
 
 
 ODD = {
@@ -103,12 +105,12 @@ def test_the_error_is_that_against_a_hundred_times_finer_steps(name):
     fine, exact = motion_and_distance(told.detail, told.times), motion_and_distance(truth, told.times)
     for channel in ("x", "speed"):
         true = float(np.sqrt(np.mean((fine[channel] - exact[channel]) ** 2)))
-        assert true <= 3.0 * errors_of(told)[channel].error, channel
+        assert true <= 3.0 * error_estimates_of(told)[channel].error, channel
 
 
 def test_a_stop_on_ice_with_an_anti_lock_system_says_that_it_does_not_repeat():
     told = run(scene({"controller": {"kind": "slip_bang_bang"}, "brakes": {"supply": 6.0}}), error=True)
-    assert errors_of(told) == {} and "otherwise" in json.loads(told.data.attrs["error"])["why"]
+    assert error_estimates_of(told) == {} and "otherwise" in json.loads(told.data.attrs["error"])["why"]
 
 
 def test_who_does_not_look_whether_it_repeats_would_be_caught(monkeypatch):
@@ -116,23 +118,23 @@ def test_who_does_not_look_whether_it_repeats_would_be_caught(monkeypatch):
     ice = shipped("braking")
     cycling = ice.model_copy(update={"run": ice.run.model_copy(update={"substeps": 2})})
     finer = ice.model_copy(update={"run": ice.run.model_copy(update={"substeps": 64})})
-    assert errors_of(run(cycling, error=True)) == {}
+    assert error_estimates_of(run(cycling, error=True)) == {}
     monkeypatch.setattr(errors, "same_commands", lambda path, other: True)
     monkeypatch.setattr(errors, "commands_change_nearby", lambda *given: False)
     told, truth = run(cycling, error=True), run(finer).detail
     true = abs(float(StopHistory(told.detail).distance_travelled[-1] - StopHistory(truth).distance_travelled[-1]))
-    assert true > 10.0 * errors_of(told)["stopping distance"].error
+    assert true > 10.0 * error_estimates_of(told)["stopping distance"].error
 
 
 def test_a_stop_on_ice_that_does_repeat_has_a_number():
     ice = shipped("braking")
     finer = ice.model_copy(update={"run": ice.run.model_copy(update={"substeps": 12})})
-    told = errors_of(run(finer, procedure="straight", error=True))
+    told = error_estimates_of(run(finer, procedure="straight", error=True))
     assert 0.0 < told["stopping distance"].error < 0.01 and not told["x"].warned
 
 
 def test_a_vehicle_that_rocks_as_it_comes_to_rest_has_no_error_of_its_distance():
-    told = errors_of(run(scene({"relaxation": {"front": 0.3, "rear": 0.3}}), error=True))
+    told = error_estimates_of(run(scene({"relaxation": {"front": 0.3, "rear": 0.3}}), error=True))
     assert "x" in told and "stopping distance" not in told
 
 
@@ -156,4 +158,4 @@ def test_orders_are_observed_of_any_numbers_of_steps():
 )
 def test_shipped_scenes_break_nothing(file):
     for name in shipped(file).procedures:
-        assert broken_of(run(shipped(file), procedure=name)) == [], name
+        assert broken_assumptions_of(run(shipped(file), procedure=name)) == [], name

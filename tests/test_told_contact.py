@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.core.assumptions import broken_of
-from models.core.discretisation import CELLS_NOTE, error_lines, errors_of, finite_rms
+from models.core.assumptions import broken_assumptions_of
+from models.core.discretisation import CELLS_NOTE, error_estimates_of, error_lines, finite_rms
 from models.core.errors import RunFailed
 from models.systems.contact import plan
 from models.systems.contact.run import run
@@ -45,7 +45,7 @@ STEEL = {"title": "a held wheelset", "system": "wheel-rail", "cases": {"A": {"ya
 
 
 def names(result):
-    return {one.name for one in broken_of(result)}
+    return {one.name for one in broken_assumptions_of(result)}
 
 
 def scene(**changes):
@@ -56,7 +56,7 @@ def scene(**changes):
 def test_a_planted_breach_is_found_and_its_remedy_lifts_it(name):
     breaks, cures, words = PLANTED[name]
     broke = run(scene(**breaks), error=False)
-    (one,) = (one for one in broken_of(broke) if one.name == name)
+    (one,) = (one for one in broken_assumptions_of(broke) if one.name == name)
     assert words in one.remedy and one.share == 1.0 and broke.data.attrs["status"].endswith("assumptions broken")
     assert name not in names(run(scene(**(breaks | cures)), error=False))
 
@@ -74,7 +74,10 @@ def test_rows_of_a_table_are_judged(tmp_path):
     table = {"title": "t", "system": "contact", "cases": {"file": "c.csv"}, "method": {"cells": 21}}
     answered = run(build(table, "t.toml", tmp_path), answers=tmp_path / "out.csv")
     assert names(answered) == {"axes alike", "elastic", "small creepage", "constant friction"}
-    assert all(0.0 < one.share < 0.5 for one in broken_of(answered)) and errors_of(answered)["force"].of == CELLS_NOTE
+    assert (
+        all(0.0 < one.share < 0.5 for one in broken_assumptions_of(answered))
+        and error_estimates_of(answered)["force"].of == CELLS_NOTE
+    )
     run(build(table, "t.toml", tmp_path), answers=tmp_path / "bare.csv", error=False)
     assert "error" not in (tmp_path / "bare.csv").read_text().splitlines()[0]
 
@@ -104,16 +107,16 @@ def test_errors_of_cells_and_of_theory_are_both_told_and_neither_when_not_asked(
     told = run(swept)
     first, second = error_lines(told)
     assert first.startswith("error at most") and second.startswith("error of the theory at most")
-    assert errors_of(run(swept, error=False)) == {} and "error_of_cells" not in run(swept, error=False).data
+    assert error_estimates_of(run(swept, error=False)) == {} and "error_of_cells" not in run(swept, error=False).data
     assert error_lines(run(scene(**LINEAR)))[0] == "error not estimated: the linear theory has no cells"
 
 
 def test_cells_that_are_too_few_are_warned_of_with_those_to_use():
     coarse = run(scene(method={"cells": 5}))
-    (worst, *_), line = errors_of(coarse).values(), error_lines(coarse)[0]
+    (worst, *_), line = error_estimates_of(coarse).values(), error_lines(coarse)[0]
     assert "WARNING, use at least" in line and line.endswith(CELLS_NOTE)
     finer = run(scene(method={"cells": int(worst.step)}))
-    assert errors_of(finer)["force"].share < 0.3 * worst.share and "WARNING" not in error_lines(finer)[0]
+    assert error_estimates_of(finer)["force"].share < 0.3 * worst.share and "WARNING" not in error_lines(finer)[0]
 
 
 def test_a_flange_of_a_held_wheelset_yields_under_its_load_and_not_under_less():
@@ -124,16 +127,16 @@ def test_a_flange_of_a_held_wheelset_yields_under_its_load_and_not_under_less():
 
 def test_a_held_wheelset_that_slips_fast_is_told():
     fast = held(STEEL | {"positions": {"start": 0.006, "stop": 0.006, "count": 1}, "wheelset": {"speed": 150.0}})
-    (one,) = broken_of(result := wheel_rail.run(fast))
+    (one,) = broken_assumptions_of(result := wheel_rail.run(fast))
     assert one.name == "constant friction" and "lower wheelset.speed" in one.remedy
     assert "assumes    friction is the same however fast the wheels slip" in held_plan.describe(fast)
-    assert errors_of(result) == {}
+    assert error_estimates_of(result) == {}
 
 
 @pytest.mark.full
 def test_the_error_of_a_held_wheelset_is_that_against_four_times_the_cells():
     some = held(STEEL | {"positions": {"start": 0.002, "stop": 0.008, "count": 3}, "method": {"cells": 15}})
-    told = errors_of(run_ := wheel_rail.run(some, error=True))
+    told = error_estimates_of(run_ := wheel_rail.run(some, error=True))
     finer = replace(some.contact(some.cases["A"]), cell_factor=0.25 * 31 / 15)
     placed = run_.detail.placements
     gaps = [wheel_rail.wheel_sums(one) - wheel_rail.wheel_sums(finer.at(one.shift, one.yaw)) for one in placed]

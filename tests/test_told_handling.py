@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.core.assumptions import assumption_sentences, broken_of
-from models.core.discretisation import WARNED_SHARE, error_lines, errors_of
+from models.core.assumptions import assumption_sentences, broken_assumptions_of
+from models.core.discretisation import WARNED_SHARE, error_estimates_of, error_lines
 from models.core.errors import RunFailed
 from models.core.systems import load
 from models.systems.handling import run as module
@@ -50,7 +50,7 @@ def test_what_is_broken_is_told_with_its_remedy(name):
     own = scene(2.5e-5 if name == "moving tyres" else 1e-3, tyres=tyres, **manoeuvre)
     if manoeuvre.get("rough"):
         own = own.model_copy(update={"road": own.road.model_copy(update={"iso8608": "E"})})
-    told = {one.name: one for one in broken_of(run(own, engine))}
+    told = {one.name: one for one in broken_assumptions_of(run(own, engine))}
     assert name in told and remedy in told[name].remedy
     assert 0.0 < told[name].share <= 1.0 and 0.0 <= told[name].first < own.manoeuvres["own"].duration
 
@@ -64,13 +64,13 @@ def test_what_is_broken_is_told_with_its_remedy(name):
     ],
 )
 def test_with_the_remedy_nothing_is_broken(manoeuvre, tyres):
-    assert broken_of(run(scene(tyres=tyres, **manoeuvre), "mujoco")) == []
+    assert broken_assumptions_of(run(scene(tyres=tyres, **manoeuvre), "mujoco")) == []
 
 
 def test_a_gentle_manoeuvre_breaks_nothing_and_show_lists_what_is_assumed():
     own = scene(steer=[[0.1, 0.0], [0.4, 0.02]])
     gentle = run(own, "mujoco")
-    assert broken_of(gentle) == [] and gentle.data.attrs["status"] == "complete"
+    assert broken_assumptions_of(gentle) == [] and gentle.data.attrs["status"] == "complete"
     assert (
         all(line in describe(own) for line in assumption_sentences(gentle)) and len(assumption_sentences(gentle)) >= 10
     )
@@ -83,10 +83,10 @@ def test_the_error_that_is_told_is_that_of_steps_and_cells(step, cells):
     told = run(own, "mujoco", error=True)
     fine = run(scene(step / 2, 8 * cells, **own.manoeuvres["own"].model_dump()), "mujoco")
     mine, truth = (principal_series(each.detail).channels for each in (told, fine))
-    worst = max(errors_of(told), key=lambda name: errors_of(told)[name].share)
+    worst = max(error_estimates_of(told), key=lambda name: error_estimates_of(told)[name].share)
     true = float(np.sqrt(np.mean((mine[worst] - truth[worst][::2]) ** 2)))
-    assert true / 3.0 < errors_of(told)[worst].error < 10.0 * true
-    assert errors_of(told)[worst].unit in ("N", "m/s", "rad/s")
+    assert true / 3.0 < error_estimates_of(told)[worst].error < 10.0 * true
+    assert error_estimates_of(told)[worst].unit in ("N", "m/s", "rad/s")
 
 
 @pytest.mark.parametrize("steps", [1, 2, 5, 7])
@@ -94,7 +94,7 @@ def test_the_error_that_is_told_is_that_of_steps_and_cells(step, cells):
 def test_a_manoeuvre_of_few_steps_tells_the_error_of_its_start(steps, engine):
     """Twice the step outlasts one step, and is too long for five: a part from the middle would miss the steering."""
     steered = {"duration": round(steps * 1e-3, 9), "steer": [[0.0, 0.0], [0.002, 0.02]]}
-    told = errors_of(run(scene(**steered), engine, error=True))["fy"].error
+    told = error_estimates_of(run(scene(**steered), engine, error=True))["fy"].error
     drives = [principal_series(run(scene(step, **steered), engine).detail).channels["fy"] for step in (1e-3, 2.5e-4)]
     assert told > float(np.sqrt(np.mean((drives[0] - drives[1][::4]) ** 2))) / 3.0
 
@@ -102,25 +102,25 @@ def test_a_manoeuvre_of_few_steps_tells_the_error_of_its_start(steps, engine):
 def test_an_estimate_without_the_net_would_be_caught(monkeypatch):
     """Planted fault: steps alone tell a thousandth of what the net errs by."""
     own = scene(1e-3, 7, steer=[[0.05, 0.0], [0.4, 0.05]], duration=0.4)
-    whole = errors_of(run(own, "mujoco", error=True))["fy"]
+    whole = error_estimates_of(run(own, "mujoco", error=True))["fy"]
     monkeypatch.setattr(module, "summed_error", lambda step, net: step)
-    assert errors_of(run(own, "mujoco", error=True))["fy"].error < 0.01 * whole.error
+    assert error_estimates_of(run(own, "mujoco", error=True))["fy"].error < 0.01 * whole.error
 
 
 def test_few_cells_are_a_warning_with_those_to_use():
     own = scene(1e-3, 5, steer=[[0.05, 0.0], [0.4, 0.05]], duration=0.4)
     told = run(own, "mujoco", error=True)
-    worst = max(errors_of(told).values(), key=lambda one: one.share)
+    worst = max(error_estimates_of(told).values(), key=lambda one: one.share)
     assert worst.warned and error_lines(told)[0].endswith(f"use at least {worst.step:g} tyres.cells")
     cured = run(scene(1e-3, round(worst.step), **own.manoeuvres["own"].model_dump()), "mujoco", error=True)
-    assert max(one.share for one in errors_of(cured).values()) < WARNED_SHARE
+    assert max(one.share for one in error_estimates_of(cured).values()) < WARNED_SHARE
 
 
 def test_no_error_costs_no_run(monkeypatch):
     calls = []
     march = module.drive_run
     monkeypatch.setattr(module, "drive_run", lambda *told: calls.append(told) or march(*told))
-    assert errors_of(run(scene(), "mujoco")) == {} and len(calls) == 1
+    assert error_estimates_of(run(scene(), "mujoco")) == {} and len(calls) == 1
 
 
 def test_a_part_from_the_middle_goes_on_as_the_run_did():
@@ -138,6 +138,6 @@ def test_a_part_from_the_middle_goes_on_as_the_run_did():
 def test_the_shipped_scene_breaks_but_what_its_title_says():
     own = load(SHIPPED)
     for name in own.manoeuvres:
-        broken = [one.name for one in broken_of(run(own, "mujoco", name))]
+        broken = [one.name for one in broken_assumptions_of(run(own, "mujoco", name))]
         assert broken == (["one friction"] if name == "brake_in_curve" else [])
     assert "until all wheels slide, at one friction" in own.title

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from models.core import told
-from models.core.assumptions import assumption_sentences, broken_of, with_assumptions
-from models.core.discretisation import errors_of
+from models.core.assumptions import assumption_sentences, broken_assumptions_of, with_assumptions
+from models.core.discretisation import error_estimates_of
 from models.core.systems import load
 from models.core.time_series import write_time_series
 from models.systems.braking.of_scene import tyre_table_of
@@ -20,12 +20,12 @@ from models.systems.hub_forces.scene import COLUMNS_OF_ANGLES, COLUMNS_OF_HUB, H
 from models.systems.measured.run import run as run_recording
 from models.systems.measured.scene import build as recording
 from models.tyre.assumptions import tyre_table_assumptions as of_table
-from models.vehicles.cut_vehicle import cut
+from models.vehicles.cut_vehicle import cut_at_hubs
 from models.vehicles.vehicle_file import load_vehicle
 from studies.tyre import run as read_tyre
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
-CAR = cut(load_vehicle("r19_free"), "body")
+CAR = cut_at_hubs(load_vehicle("r19_free"), "body")
 
 
 def scene(road: dict | None = None, **tables: dict) -> HubScene:
@@ -72,28 +72,30 @@ PLANTED = {
 def test_what_is_broken_is_told_with_its_remedy_and_gone_with_it(name):
     engine = ("mujoco", "reference", "exudyn")[list(PLANTED).index(name) % 3]
     planted, cured, remedy = PLANTED[name]
-    broken = {one.name: one for one in broken_of(run(scene(**planted), engine))}
+    broken = {one.name: one for one in broken_assumptions_of(run(scene(**planted), engine))}
     assert name in broken and remedy in broken[name].remedy and 0.0 < broken[name].share <= 1.0
-    assert name not in {one.name for one in broken_of(run(scene(**cured), engine))}
+    assert name not in {one.name for one in broken_assumptions_of(run(scene(**cured), engine))}
 
 
 def test_forces_out_of_balance_and_a_vehicle_that_turns_are_told(tmp_path):
-    light = {one.name: one for one in broken_of(run(filed(tmp_path, 0.8), "mujoco"))}
+    light = {one.name: one for one in broken_assumptions_of(run(filed(tmp_path, 0.8), "mujoco"))}
     assert set(light) == {"balance"} and light["balance"].worst == pytest.approx(0.85, abs=0.01)  # 0.05 may be motion
     turning = {"forces": {"file": "forces.csv", "frame": "inertial"}, "stabilise": {"bandwidth": 2.0}}
     own = filed(tmp_path, lift=8000.0, **turning)
-    free = {one.name: one for one in broken_of(run(own, "reference"))}
+    free = {one.name: one for one in broken_assumptions_of(run(own, "reference"))}
     assert "same attitude" in free and "kalman_filter" in free["same attitude"].remedy
     assert free["same attitude"].first > 0.4 and free["same attitude"].worst > 0.05
     held = run(own, "reference", "prescribed")
-    assert "same attitude" not in {one.name for one in broken_of(held)}
-    assert broken_of(run(filed(tmp_path), "exudyn")) == []
+    assert "same attitude" not in {one.name for one in broken_assumptions_of(held)}
+    assert broken_assumptions_of(run(filed(tmp_path), "exudyn")) == []
 
 
 def test_the_measurement_itself_is_judged_and_show_lists_all():
     own = scene({"iso8608": "H", "speed": 30.0})
     measurement = module.measure(own, "mujoco")
-    true = {one.name: one for one in broken_of(module.labelled_result(measurement, measurement.truth, "mujoco"))}
+    true = {
+        one.name: one for one in broken_assumptions_of(module.labelled_result(measurement, measurement.truth, "mujoco"))
+    }
     assert {"tyres press", "springs between stops", "side forces"} <= set(true)
     assert 'system = "handling"' in true["side forces"].remedy
     assert all(line in describe(own) for line in assumption_sentences(run(own, "mujoco", measurement=measurement)))
@@ -111,7 +113,7 @@ def test_the_error_that_is_told_is_that_of_measurement_and_run(step, rate, metho
 
     own, fine = made(step, True), made(step / 8, False)
     mine, truth = (principal_series(CAR, each.detail).channels for each in (own, fine))
-    name, one = max(errors_of(own).items(), key=lambda each: each[1].share)
+    name, one = max(error_estimates_of(own).items(), key=lambda each: each[1].share)
     true = float(np.sqrt(np.mean((mine[name] - truth[name][::8]) ** 2)))
     assert true / 3.0 < one.error < 10.0 * true and one.unit == "N"
 
@@ -119,9 +121,9 @@ def test_the_error_that_is_told_is_that_of_measurement_and_run(step, rate, metho
 def test_longer_steps_than_the_samples_would_be_caught(monkeypatch):
     """Planted fault: white noise between steps that skip samples is taken for an error of the steps."""
     own = scene({"iso8608": "A"}, forces={"sampling_rate": 500.0, "force_deviation": 200.0})
-    right = max(one.share for one in errors_of(run(own, "mujoco", error=True)).values())
-    monkeypatch.setattr(module, "divides", lambda step, period: True)
-    assert max(one.share for one in errors_of(run(own, "mujoco", error=True)).values()) > 10.0 * right
+    right = max(one.share for one in error_estimates_of(run(own, "mujoco", error=True)).values())
+    monkeypatch.setattr(module, "step_divides", lambda step, period: True)
+    assert max(one.share for one in error_estimates_of(run(own, "mujoco", error=True)).values()) > 10.0 * right
 
 
 def test_no_error_costs_no_run_and_a_comparison_tells_of_all(monkeypatch):
@@ -130,10 +132,15 @@ def test_no_error_costs_no_run_and_a_comparison_tells_of_all(monkeypatch):
     monkeypatch.setattr(module, "HubModel", lambda *model: models.append(model) or model_of(*model))
     own = scene()
     plain = compare_stabilisers(own.model_copy(update={"error": False}), ("mujoco",))
-    assert len(models) == 4 and not calls and told.message_lines(plain.results) == []  # the measurement, and three runs
+    assert (
+        len(models) == 4 and not calls and told.messages_on_results(plain.results) == []
+    )  # the measurement, and three runs
     whole = compare_stabilisers(own, ("mujoco",))
     assert set(whole.results) == {"true", "free, mujoco", "filter", "prescribed"}
-    assert all(errors_of(each) for each in whole.results.values()) and len(told.message_lines(whole.results)) == 4
+    assert (
+        all(error_estimates_of(each) for each in whole.results.values())
+        and len(told.messages_on_results(whole.results)) == 4
+    )
     steps = [round(model[4] / model[3]) for model in calls]
     assert sum(steps) / 1200 <= 1.6  # 0.6 of the four runs of 300 steps each
 
@@ -146,8 +153,8 @@ def recorded(**virtual: object):
 
 def test_recordings_are_judged(tmp_path):
     right = run_recording(recorded(), error=True)
-    assert broken_of(right) == [] and len(assumption_sentences(right)) == 6
-    assert 0.0 < max(one.share for one in errors_of(right).values()) < 0.02
+    assert broken_assumptions_of(right) == [] and len(assumption_sentences(right)) == 6
+    assert 0.0 < max(one.share for one in error_estimates_of(right).values()) < 0.02
     run_recording(recorded(), folder=tmp_path / "a")
     lines = (tmp_path / "a" / "measured.csv").read_text().splitlines()
     header, *rows = [line for line in lines if not line.startswith("#")]
@@ -158,12 +165,14 @@ def test_recordings_are_judged(tmp_path):
     (tmp_path / "b").mkdir()
     (tmp_path / "b" / "measured.csv").write_text("\n".join(text))
     (tmp_path / "b" / "scene.toml").write_text((tmp_path / "a" / "scene.toml").read_text())
-    (one,) = broken_of(run_recording(load(tmp_path / "b" / "scene.toml")))
+    (one,) = broken_assumptions_of(run_recording(load(tmp_path / "b" / "scene.toml")))
     assert (one.name, one.where) == ("transducers in range", "fl_fz") and one.worst == pytest.approx(0.1, abs=0.02)
     assert "[clock]" in one.remedy
     heavy = run_recording(recorded(faults={"gain": {"force": 0.3}}))
-    assert "balance" in {one.name for one in broken_of(heavy)}
-    rough = {one.name: one for one in broken_of(run_recording(recorded(road={"iso8608": "H", "speed": 30.0})))}
+    assert "balance" in {one.name for one in broken_assumptions_of(heavy)}
+    rough = {
+        one.name: one for one in broken_assumptions_of(run_recording(recorded(road={"iso8608": "H", "speed": 30.0})))
+    }
     assert {"wheels press", "springs between stops"} <= set(rough)
 
 
@@ -171,10 +180,12 @@ def test_a_table_of_a_tyre_has_no_steps_and_says_where_it_ends(tmp_path):
     table = {"title": "t", "system": "braking", "procedures": {"straight": {}}, "study": "tyre"}
     own = build_braking({**table, "road": {"stretches": [{"left": "ice"}]}}, "s.toml", tmp_path)
     results = read_tyre(own, (), tmp_path, lambda what, share: None)["results"]
-    assert broken_of(results["ice"]) == [] and "a table has no steps" in told.message_lines(results)[0]
+    assert (
+        broken_assumptions_of(results["ice"]) == [] and "a table has no steps" in told.messages_on_results(results)[0]
+    )
     whole = tyre_table_of(own, "ice")
     short = whole.refined(whole.angles[:3], whole.slips, np.array([5e3, 2e4]))
-    beyond = {one.name: one for one in broken_of(with_assumptions(results["ice"], of_table(short, 3e4)))}
+    beyond = {one.name: one for one in broken_assumptions_of(with_assumptions(results["ice"], of_table(short, 3e4)))}
     assert set(beyond) == {"slip angles in the table", "loads in the table"}
     assert all("tyres.files" in one.remedy for one in beyond.values())
 
@@ -182,6 +193,6 @@ def test_a_table_of_a_tyre_has_no_steps_and_says_where_it_ends(tmp_path):
 @pytest.mark.full
 def test_the_shipped_scenes_break_nothing():
     comparison = compare_stabilisers(load(SCENES / "hub_forces.toml"), ("mujoco",))
-    assert all(broken_of(each) == [] for each in comparison.results.values())
-    assert broken_of(run(load(SCENES / "choice_hub_forces.toml"), "mujoco")) == []
-    assert broken_of(run_recording(load(SCENES / "recording.toml"))) == []
+    assert all(broken_assumptions_of(each) == [] for each in comparison.results.values())
+    assert broken_assumptions_of(run(load(SCENES / "choice_hub_forces.toml"), "mujoco")) == []
+    assert broken_assumptions_of(run_recording(load(SCENES / "recording.toml"))) == []

@@ -10,8 +10,8 @@ import pytest
 from models.advice.choice.choose import EffectChooser
 from models.advice.price.runner import attempt
 from models.core import told
-from models.core.assumptions import broken_of, collected_breaches
-from models.core.discretisation import Estimate, errors_of, with_stated_errors
+from models.core.assumptions import broken_assumptions_of, collected_broken_assumptions
+from models.core.discretisation import Estimate, error_estimates_of, with_stated_errors
 from models.core.systems import load
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import build
@@ -101,23 +101,25 @@ def test_curves_have_marks_at_the_points_of_their_own_engine(tmp_path, monkeypat
 def test_what_results_say_survives_json(pulling):
     said = json.loads(json.dumps(told.attributes_for_json({"reference": pulling})))
     (copy,) = told.results_with_attributes(said).values()
-    assert broken_of(copy) == broken_of(pulling) and errors_of(copy) == errors_of(pulling)
+    assert broken_assumptions_of(copy) == broken_assumptions_of(pulling) and error_estimates_of(
+        copy
+    ) == error_estimates_of(pulling)
 
 
 def test_many_results_are_told_in_few_lines(pulling):
     rough = [type(pulling)(pulling.data.copy()) for _ in range(9)]
     for i, one in enumerate(rough):
         with_stated_errors(one, {"f1": Estimate(3.0, "N", 0.03 + 0.01 * i, 4.0, 1e-3)}, "hand")
-    said = told.message_lines({f"k={i}": one for i, one in enumerate(rough)})
+    said = told.messages_on_results({f"k={i}": one for i, one in enumerate(rough)})
     assert said[0].startswith("  9 results, the largest error k=8: error at most 11 %") and "WARNING" in said[0]
     assert said[1] == "  errors above 2 % in 9 of 9: k=0, k=1, k=2, k=3 and 5 more" and "and 5 more: ass" in said[2]
 
 
 def test_a_difference_below_the_stated_errors_is_called_so(tmp_path, pulling):
     shifted = type(pulling)(pulling.data.copy(deep=True))
-    error = errors_of(pulling)["f1"].error
+    error = error_estimates_of(pulling)["f1"].error
     shifted.data["f1"].values[:] += error
-    shifted.data["f2"].values[:] += 3.0 * errors_of(pulling)["f2"].error
+    shifted.data["f2"].values[:] += 3.0 * error_estimates_of(pulling)["f2"].error
     for name, one in (("a", pulling), ("b", shifted)):
         one.save(tmp_path / f"{name}.nc")
     found = {one.name: one for one in compare(tmp_path / "a.nc", tmp_path / "b.nc")[0]}
@@ -125,7 +127,7 @@ def test_a_difference_below_the_stated_errors_is_called_so(tmp_path, pulling):
     summary = report(tmp_path / "a.nc", tmp_path / "b.nc", tmp_path)
     assert summary["within the stated error"] == ["f1"] and len(summary["results"]) == 2
     assert any("f1 " in line and "rms within the stated error of" in line for line in summary["table"])
-    assert any("assumption broken" in line for line in told.message_lines(summary["results"]))
+    assert any("assumption broken" in line for line in told.messages_on_results(summary["results"]))
     assert "stated error of both" in (tmp_path / "compare.csv").read_text().splitlines()[0]
 
 
@@ -155,7 +157,7 @@ def test_a_choice_keeps_what_the_assumptions_need_and_states_its_error(tmp_path)
     said = "\n".join(choice_lines(found, False))
     assert "lift_off stays; without it an assumption would be broken: linear tyres stay on the road" in said
     (left,) = found.results
-    assert errors_of(left) and broken_of(left) == []
+    assert error_estimates_of(left) and broken_assumptions_of(left) == []
     monkey = EffectChooser(scene, "reference", scene.quantities, scene.tolerance)
     monkey.breaks_assumption = lambda chosen: False  # what the screen foretells is confirmed by whole runs, too
     assert not monkey.within_tolerance(monkey.confirmed_changes(frozenset(["lift_off"])))
@@ -238,7 +240,7 @@ def test_what_a_case_allows_is_told_with_its_reason(pulling):
 
 
 def test_inner_watches_keep_what_they_see(pulling):
-    with collected_breaches() as outer, collected_breaches() as inner:
+    with collected_broken_assumptions() as outer, collected_broken_assumptions() as inner:
         again(pulling)
     assert "tyres press" in inner and not outer
 

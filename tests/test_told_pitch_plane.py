@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from models.core import discretisation
-from models.core.assumptions import broken_of
-from models.core.discretisation import Series, errors_of, largest_estimate, with_estimated_errors
+from models.core.assumptions import broken_assumptions_of
+from models.core.discretisation import RunSeries, error_estimates_of, largest_estimate, with_estimated_errors
 from models.core.errors import RunFailed
 from models.core.result import Channel, result
 from models.core.systems import load
@@ -32,7 +32,7 @@ def scene(folder="", duration=1.0, step=1e-3, **tables):
 
 def breaches(planted, engine="reference"):
     """Broken assumptions of a run by their names."""
-    return {breach.name: breach for breach in broken_of(run(planted, engine))}
+    return {breach.name: breach for breach in broken_assumptions_of(run(planted, engine))}
 
 
 @pytest.fixture
@@ -192,7 +192,7 @@ def told_and_true(engine, integrator, step, tables):
     planted = scene(duration=2.0, step=step, engines={engine: {"integrator": integrator}}, **tables)
     made = run(planted, engine, error=True)
     truth = run(planted, "reference", Settings("RK4", step / 100.0, 2.0))
-    name, said = max(errors_of(made).items(), key=lambda entry: entry[1].share)
+    name, said = max(error_estimates_of(made).items(), key=lambda entry: entry[1].share)
     rows = np.rint(made.times / (step / 100.0)).astype(int)
     return float(np.sqrt(np.mean((made[name] - truth[name][rows]) ** 2))) / said.error
 
@@ -206,10 +206,10 @@ def test_forces_whose_steps_cannot_be_longer_are_told_by_shorter_ones(files):
     folder = files(3000.0, 2000.0, duration=4.0)
     made = run(scene(folder, 4.0, effects=FORCES), "reference", error=True)
     truth = run(scene(folder, 4.0, effects=FORCES), "reference", Settings("RK4", 2.5e-5, 4.0))
-    assert "half the step" in made.data.attrs["error"] and set(errors_of(made)) == {"z3", "pitch", "f3", "f4"}
-    worst = max(errors_of(made), key=lambda name: errors_of(made)[name].share)
+    assert "half the step" in made.data.attrs["error"] and set(error_estimates_of(made)) == {"z3", "pitch", "f3", "f4"}
+    worst = max(error_estimates_of(made), key=lambda name: error_estimates_of(made)[name].share)
     true = float(np.sqrt(np.mean((made[worst] - truth[worst][::40]) ** 2)))
-    assert 0.1 < true / errors_of(made)[worst].error < 3.0
+    assert 0.1 < true / error_estimates_of(made)[worst].error < 3.0
 
 
 def test_an_estimate_that_forgets_how_errors_grow_is_caught(monkeypatch):
@@ -217,20 +217,22 @@ def test_an_estimate_that_forgets_how_errors_grow_is_caught(monkeypatch):
 
     step = 0.002  # s: so many rows that a part of them is repeated
 
-    def drifting(factor: float, share: float = 1.0) -> Series:
+    def drifting(factor: float, share: float = 1.0) -> RunSeries:
         if factor > 1.0:
             raise RunFailed("reference", "no longer step can be")
         times = step * factor * np.arange(round(share * 4.0 / (step * factor)) + 1)
-        return Series(times, {"z3": np.sin(5.0 * times) + 1e-3 * factor**2 * times**2})
+        return RunSeries(times, {"z3": np.sin(5.0 * times) + 1e-3 * factor**2 * times**2})
 
     fine = drifting(1.0)
     made = result(
         scene(), {"z3": Channel("time", fine.channels["z3"], "m")}, {"time": Channel("time", fine.times, "s")}
     )
     true = 1e-3 * float(np.sqrt(np.mean(fine.times**4)))
-    assert errors_of(with_estimated_errors(made, fine, drifting, 2, step))["z3"].error == pytest.approx(true, rel=0.3)
+    assert error_estimates_of(with_estimated_errors(made, fine, drifting, 2, step))["z3"].error == pytest.approx(
+        true, rel=0.3
+    )
     monkeypatch.setattr(discretisation, "_growth_after_window", lambda gap, values: 1.0)
-    assert errors_of(with_estimated_errors(made, fine, drifting, 2, step))["z3"].error < true / 3.0
+    assert error_estimates_of(with_estimated_errors(made, fine, drifting, 2, step))["z3"].error < true / 3.0
 
 
 @pytest.mark.parametrize("steps", [1, 2, 3, 5])
@@ -240,7 +242,7 @@ def test_a_run_of_few_steps_is_compared_at_its_own_times(steps):
     truth = run(scene(duration=steps * 1e-3, step=1e-3 / 8, start={"z3": -0.1}), "mujoco")
     for name in ("z3", "f3"):
         true = float(np.sqrt(np.mean((made[name] - truth[name][::8]) ** 2)))
-        assert true / 3.0 < errors_of(made)[name].error < 30.0 * true  # the order of a few steps is not seen
+        assert true / 3.0 < error_estimates_of(made)[name].error < 30.0 * true  # the order of a few steps is not seen
 
 
 def test_a_refused_run_names_a_step_that_is_then_accepted():
@@ -265,5 +267,5 @@ SAYS_SO = {"tyres press", "springs compressed"}
 def test_shipped_scenes_raise_no_alarm_that_they_do_not_speak_of(name, allowed):
     shipped = load(SCENES_FOLDER / f"{name}.toml")
     made = run(shipped, "reference", error=True)
-    assert {breach.name for breach in broken_of(made)} == allowed and not largest_estimate(made).warned
+    assert {breach.name for breach in broken_assumptions_of(made)} == allowed and not largest_estimate(made).warned
     assert not allowed or "for 3 % of the time" in (SCENES_FOLDER / f"{name}.toml").read_text()

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from models.core import discretisation, told
-from models.core.assumptions import broken_of
-from models.core.discretisation import errors_of
+from models.core.assumptions import broken_assumptions_of
+from models.core.discretisation import error_estimates_of
 from models.core.errors import RunFailed
 from models.systems.ride import errors, nonlinear
 from models.systems.ride.nonlinear import RunSampling
@@ -32,7 +32,7 @@ def scene(file="half_car", level=1.6e-5, speed=20.0, point="unloaded", **tables)
 
 
 def names(result):
-    return {one.name for one in broken_of(result)}
+    return {one.name for one in broken_assumptions_of(result)}
 
 
 PLANTED = {
@@ -62,7 +62,7 @@ PLANTED = {
 @pytest.mark.parametrize("engine", ENGINES[::2])
 def test_a_planted_breach_of_a_covariance_is_found_and_its_remedy_lifts_it(name, engine):
     breaking, keeping, remedy = PLANTED[name]
-    (one,) = (one for one in broken_of(run(breaking, engine)) if one.name == name)
+    (one,) = (one for one in broken_assumptions_of(run(breaking, engine)) if one.name == name)
     assert remedy in one.remedy and (not one.law or 0.00135 < one.share <= 0.5) and one.says in describe(breaking)
     assert name not in names(run(keeping, engine))
 
@@ -71,7 +71,7 @@ def test_the_share_of_time_is_that_of_the_normal_law():
     from scipy.special import ndtr
 
     result = run(scene(level=2e-4), "reference")
-    (one,) = (one for one in broken_of(result) if one.name == "tyres press")
+    (one,) = (one for one in broken_assumptions_of(result) if one.name == "tyres press")
     outputs = result["output"].tolist()
     deviation = max(result["deviation"][0, 0, [i for i, name in enumerate(outputs) if "tyre force" in name]])
     load = 3.0 * deviation + one.worst  # the worst value lies three deviations below the load at rest
@@ -91,7 +91,7 @@ def bent():
 @pytest.mark.parametrize("name", ["tyres press", "travel of front left", "rate of front left"])
 def test_planted_breaches_of_runs_in_time_are_found_by_all(bent, name):
     for engine, result in bent.items():
-        (one,) = (one for one in broken_of(result) if one.name == name)
+        (one,) = (one for one in broken_assumptions_of(result) if one.name == name)
         assert one.share > 0.0 and (engine == "reference" or one.first >= 0.0)
     assert ("nearly Gaussian" in names(bent["reference"])) and "nearly Gaussian" not in names(bent["mujoco"])
 
@@ -113,7 +113,7 @@ def test_lift_off_and_longer_tables_take_the_assumptions_away():
 def test_a_drive_tells_when_a_tyre_would_first_pull():
     drive = {"time": [0.0, 2.0], "speed": [2.0, 30.0]}
     given = scene(level=1e-4, drive=drive, study="ride_drive")
-    (one,) = (one for one in broken_of(run(given, "reference")) if one.name == "tyres press")
+    (one,) = (one for one in broken_assumptions_of(run(given, "reference")) if one.name == "tyres press")
     assert 0.0 < one.first < 2.0 and "at " not in one.where
 
 
@@ -124,8 +124,8 @@ def of_rounding(engine):
     road, linear = excitation_of(given, wheels(vehicle)), linear_vehicle(vehicle)
     true = np.array([exact_deviations(linear(float(v)), road, float(v)) for v in result["speed"]])
     gaps = np.sqrt(np.mean((result["deviation"][0] - true) ** 2, axis=0))
-    assert len(errors_of(result)) == len(gaps) and errors_of(run(given, engine)) == {}
-    return [float(gap / one.error) for gap, one in zip(gaps, errors_of(result).values(), strict=True)]
+    assert len(error_estimates_of(result)) == len(gaps) and error_estimates_of(run(given, engine)) == {}
+    return [float(gap / one.error) for gap, one in zip(gaps, error_estimates_of(result).values(), strict=True)]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -137,15 +137,17 @@ def test_rounding_of_a_covariance_is_told(engine):
 def test_a_drive_of_few_steps_has_its_error_or_a_reason(lasting):
     """And one whose deviations hardly change is not told that they err by much of their change."""
     made = run(scene(drive={"time": [0.0, lasting], "speed": [20.0, 20.0 + lasting]}), error=True)
-    assert errors_of(made) or "one step long" in discretisation.error_lines(made)[0]
-    assert not any(each.warned for each in errors_of(made).values())
+    assert error_estimates_of(made) or "one step long" in discretisation.error_lines(made)[0]
+    assert not any(each.warned for each in error_estimates_of(made).values())
 
 
 def test_what_stands_still_on_equal_tracks_is_no_alarm():
     """Roll of a symmetric car is rounding there: no share of it is told as an error of 200 %."""
     made = run(scene("r19_ride", road={"level": 1.6e-5, "left_right": "equal"}), "reference", error=True)
-    told_roll = errors_of(made)["roll acceleration"]
-    assert not any(each.warned for each in errors_of(made).values()) and 0.0 < told_roll.error < 1e-12  # rad/s^2
+    told_roll = error_estimates_of(made)["roll acceleration"]
+    assert (
+        not any(each.warned for each in error_estimates_of(made).values()) and 0.0 < told_roll.error < 1e-12
+    )  # rad/s^2
 
 
 def test_an_estimate_that_is_too_small_is_caught(monkeypatch):
@@ -159,7 +161,7 @@ def test_a_step_too_long_is_refused_and_the_advised_one_accepted():
     long = SHORT.model_copy(update={"step": 9e-3})
     with pytest.raises(RunFailed, match="use at most") as refusal:
         with_refusals_early(lambda: run(rough, "mujoco", sampling=long, error=True))
-    advised = min(one.step for one in errors_of(refusal.value.partial).values())
+    advised = min(one.step for one in error_estimates_of(refusal.value.partial).values())
     run(rough, "mujoco", sampling=SHORT.model_copy(update={"step": advised}), error=True)
 
 
@@ -180,9 +182,9 @@ def test_an_order_that_no_road_has_is_caught(monkeypatch):
 def test_copies_state_steps_chance_and_what_gains_miss():
     given = scene("quarter_car_nonlinear", level=6.4e-5, study="ride_nonlinear", point="loaded")
     result = run(given, "reference", sampling=SHORT, error=True)
-    channels = errors_of(result)
+    channels = error_estimates_of(result)
     assert 0.0 < channels["body front, copies"].share < 0.01 and 0.0 < channels["body front, gains"].share < 0.5
-    text = "\n".join(told.message_lines({"reference": result}))
+    text = "\n".join(told.messages_on_results({"reference": result}))
     assert "standard error of 20 paths" in text
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from models.core import told
-from models.core.assumptions import broken_of
-from models.core.discretisation import CELLS_NOTE, error_lines, errors_of
+from models.core.assumptions import broken_assumptions_of
+from models.core.discretisation import CELLS_NOTE, error_estimates_of, error_lines
 from models.core.errors import RunFailed
 from models.rail.wheelset import CHOSEN_WHEELSET
 from models.systems.wheelset import plan
@@ -50,7 +50,7 @@ def scene(**changes):
 
 
 def names(result):
-    return {one.name for one in broken_of(result)}
+    return {one.name for one in broken_assumptions_of(result)}
 
 
 @pytest.mark.parametrize("engine", ["reference", "mujoco"])
@@ -58,7 +58,7 @@ def names(result):
 def test_a_planted_breach_is_found_and_its_remedy_lifts_it(name, engine):
     breaks, cures, word = PLANTED[name]
     broke = run(scene(**breaks), engine)
-    (one,) = (one for one in broken_of(broke) if one.name == name)
+    (one,) = (one for one in broken_assumptions_of(broke) if one.name == name)
     assert word in one.remedy and one.share > 0.0 and 0.0 <= one.first <= broke.times[-1]
     assert broke.data.attrs["status"].endswith("assumptions broken") and f"worst {one.worst:.4g}" in one.line()
     assert name not in names(run(scene(**(breaks | cures)), engine))
@@ -90,8 +90,8 @@ def test_without_friction_eigenvalues_say_so():
 @pytest.mark.parametrize("engine", ["reference", "exudyn", "mujoco"])
 def test_steps_and_cells_are_both_told_by_every_engine(engine):
     result = run(scene(), engine, error=True)
-    of = {one.of for one in errors_of(result).values()}
-    assert of == {"", CELLS_NOTE} and len(error_lines(result)) == 2 and errors_of(run(scene(), engine)) == {}
+    of = {one.of for one in error_estimates_of(result).values()}
+    assert of == {"", CELLS_NOTE} and len(error_lines(result)) == 2 and error_estimates_of(run(scene(), engine)) == {}
 
 
 @pytest.mark.full
@@ -105,7 +105,7 @@ def test_a_truth_on_ten_times_the_cells_is_within_what_is_told():
 def test_a_path_of_few_steps_is_compared_at_its_own_times(steps, law):
     """Twice the step outlasts a path of one: its end beside this one's was taken for an error, its start for none."""
     table = {"contact": law, "run": {"duration": round(steps * 5e-4, 9), "displacement": 3e-3}}
-    told = errors_of(run(scene(**table), "mujoco", error=True))["y"].error
+    told = error_estimates_of(run(scene(**table), "mujoco", error=True))["y"].error
     finer = scene(**{**table, "run": {**table["run"], "step": 1.25e-4}})
     fine, finer = (principal_series(run(each, "mujoco").detail).channels["y"] for each in (scene(**table), finer))
     true = float(np.sqrt(np.mean((fine - finer[::4]) ** 2)))
@@ -116,7 +116,7 @@ def test_a_path_of_few_steps_is_compared_at_its_own_times(steps, law):
 def test_a_wheelset_that_stays_in_the_middle_is_an_answer(law):
     """Its motion is rounding, and cells by which rounding differs are not too few."""
     centred = run(scene(contact=law, run={"duration": 0.02, "displacement": 0.0}), "mujoco", error=True)
-    told = {name: each for name, each in errors_of(centred).items() if name.startswith("y")}
+    told = {name: each for name, each in error_estimates_of(centred).items() if name.startswith("y")}
     assert np.abs(centred["y"]).max() < 1e-12 and told and not any(each.warned for each in told.values())
 
 
@@ -126,7 +126,7 @@ def test_an_estimate_that_leaves_the_cells_out_would_be_caught():
     true = run(scene(contact={"cells": 70}), "reference")
     gap = principal_series(result.detail).channels["y"] - principal_series(true.detail).channels["y"]
     error = float(np.sqrt(np.mean(gap**2)))
-    assert errors_of(result)["y"].error < 0.1 * error < errors_of(result)["y of cells"].error
+    assert error_estimates_of(result)["y"].error < 0.1 * error < error_estimates_of(result)["y of cells"].error
 
 
 @pytest.mark.full
@@ -136,22 +136,24 @@ def test_cells_that_are_no_answer_are_refused_with_those_to_use():
     long = {"run": {"duration": 6.0, "displacement": 1e-3, "speeds": [80.0]}}
     with pytest.raises(RunFailed, match=r"the cells are too few, this is no answer: .* use at least") as refused:
         run(scene(**unstable, **long, contact={"cells": 5}), "reference", 80.0, error=True)
-    worst = max(errors_of(refused.value.partial).values(), key=lambda one: one.share)
+    worst = max(error_estimates_of(refused.value.partial).values(), key=lambda one: one.share)
     cured = run(scene(**unstable, **long, contact={"cells": int(worst.step)}), "reference", 80.0, error=True)
-    assert max(one.share for one in errors_of(cured).values()) < 0.5
+    assert max(one.share for one in error_estimates_of(cured).values()) < 0.5
 
 
 def test_joined_paths_keep_what_each_says():
     paths = {"reference": {SPEED: run(scene(**PUSHED), "reference", error=True)}}
     whole = over_speeds(paths)
-    assert names(whole) == names(paths["reference"][SPEED]) and "reference, 40 m/s, y of cells" in errors_of(whole)
+    assert names(whole) == names(paths["reference"][SPEED]) and "reference, 40 m/s, y of cells" in error_estimates_of(
+        whole
+    )
     json.dumps(told.errors_and_assumptions({"whole": whole}), allow_nan=False)
 
 
 def test_a_limit_cycle_tells_its_error_and_what_it_takes_for_granted():
     hunts = scene(wheelset={"override": {"conicity": 0.15, "stiffness_x": 8e5}}, contact={"cells": 5})
     found, failed = cycles_of_engines(hunts, ("reference",), 67.0, estimate_error=True)
-    said = errors_of(found["reference"])
+    said = error_estimates_of(found["reference"])
     assert (
         not failed
         and {"amplitude", "frequency", "amplitude of cells"} <= said.keys()

@@ -12,7 +12,7 @@ from models.core.scene_effects import named_effects, scene_without
 from models.engines.free_vehicle import free_model, native_elements_and_joints
 from models.engines.towed_springs import shared_numbers, towed_division
 from models.multibody import forces as at
-from models.multibody.numbers import Controls, Handling, Tyres
+from models.multibody.numbers import Controls, Handling, TyreParameters
 from models.systems.handling.energy import drive_energy, unaccounted_energy
 from models.systems.handling.plan import describe
 from models.systems.handling.run import build_in_engine as build_model
@@ -114,7 +114,7 @@ def test_springs_of_a_trailer_are_the_engines_own_and_bear_it(engine):
 
 def test_a_train_that_jackknifes_is_no_result():
     """A caravan that is backed up folds."""
-    car = Handling(caravan(), Tyres(friction=1.2), Controls(steer=((0.0, 0.1), (0.1, 0.12))))
+    car = Handling(caravan(), TyreParameters(friction=1.2), Controls(steer=((0.0, 0.1), (0.1, 0.12))))
     with pytest.raises(RunFailed, match=r"jackknifes: a trailer turns by more than 1\.57 rad .* 'caravan'"):
         drive_run("mujoco", car, -4.0, 3.0)
 

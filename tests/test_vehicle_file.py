@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.core.scene_file import parse
+from models.core.scene_file import parse_toml
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import SHIPPED_FOLDER, build_vehicle, load_vehicle, shipped_vehicles
 
@@ -131,7 +131,7 @@ def test_children_may_come_before_their_parents():
 @pytest.mark.parametrize("name", shipped_vehicles())
 def test_shipped_vehicles_name_their_sources(name):
     load_vehicle(name, allows_towing=True)
-    table = parse(SHIPPED_FOLDER / f"{name}.toml")
+    table = parse_toml(SHIPPED_FOLDER / f"{name}.toml")
     entries = [entry for key, value in table.items() if isinstance(value, list) and key != "outputs" for entry in value]
     assert all("published" in entry["source"] or "chosen" in entry["source"] for entry in entries)
 

@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 
 from models.core.noise import GYRO_BIAS, normal_samples
-from models.core.systems import of_table
+from models.core.systems import scene_of_table
 from models.engines.stability import first_order, log_growth
-from models.multibody.numbers import Handling, Tyres
+from models.multibody.numbers import Handling, TyreParameters
 from models.sensors.inertial_unit import bias_path
 from models.systems.braking.of_scene import controller_of
 from models.systems.braking.scene import build
 from models.systems.pitch_plane.sampling import within_range
 from models.vehicles.cut_vehicle import rigid_vehicle
-from models.vehicles.free_vehicle import chassis_of, spinning
+from models.vehicles.free_vehicle import chassis_of, wheel_spin_inertia
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.parameters import asymmetric_twin
-from models.vehicles.pitch_plane import describe
-from models.vehicles.spatial import steiner
+from models.vehicles.pitch_plane import pitch_plane_vehicle
+from models.vehicles.spatial import point_mass_inertia
 from models.vehicles.vehicle_file import load_vehicle
 from validation.spatial.cars import r19
 
@@ -31,7 +31,7 @@ P = asymmetric_twin.PARAMETERS
 
 
 def test_inertia_of_a_point_mass_is_the_sum_of_squares_across_each_axis():
-    inertia = steiner(2.5, np.array([0.3, 0.4, 0.1]))
+    inertia = point_mass_inertia(2.5, np.array([0.3, 0.4, 0.1]))
     assert inertia == pytest.approx(
         2.5 * np.array([[0.17, -0.12, -0.03], [-0.12, 0.10, -0.04], [-0.03, -0.04, 0.25]]), rel=1e-12
     )
@@ -39,9 +39,9 @@ def test_inertia_of_a_point_mass_is_the_sum_of_squares_across_each_axis():
 
 def test_a_wheel_spins_with_the_inertia_of_its_tyre_or_else_of_all():
     tyre = R19.tyres[0]
-    assert spinning(replace(tyre, spin_inertia=None), 1.75) == 1.75
-    assert spinning(replace(tyre, spin_inertia=2.25), 1.75) == 2.25
-    car = Handling(R19, Tyres(spin_inertia=1.75)).vehicle
+    assert wheel_spin_inertia(replace(tyre, spin_inertia=None), 1.75) == 1.75
+    assert wheel_spin_inertia(replace(tyre, spin_inertia=2.25), 1.75) == 2.25
+    car = Handling(R19, TyreParameters(spin_inertia=1.75)).vehicle
     rotors = [body.inertia for body in car.bodies if body.name.endswith("rotor")]
     assert rotors == 4 * [((0.0, 0.0, 0.0), (0.0, 1.75, 0.0), (0.0, 0.0, 0.0))]
 
@@ -63,7 +63,7 @@ def test_tyres_that_may_lift_are_the_same_tyres():
 
 
 def test_struts_to_the_ground_are_the_tyres_of_a_vehicle_in_the_pitch_plane():
-    tyres = describe(P).tyres
+    tyres = pitch_plane_vehicle(P).tyres
     assert [(tyre.stiffness, tyre.damping) for tyre in tyres] == [(P.k1, P.d1), (P.k2, P.d2)]
 
 
@@ -131,6 +131,6 @@ def test_results_of_a_measured_drive_begin_at_the_time_of_its_file(tmp_path: Pat
     rows = "\n".join(f"{5.25 + 0.1 * k:.2f},{0.01 * k:.2f},{8.5:.2f}" for k in range(21))
     (tmp_path / "drive.csv").write_text(f"time [s],steer [rad],speed [m/s]\n{rows}\n")
     table = {"title": "t", "system": "handling", "manoeuvres": {"way": {"measured": "drive.csv"}}}
-    scene = of_table(table, "s.toml", tmp_path)
+    scene = scene_of_table(table, "s.toml", tmp_path)
     assert scene.start_time("way") == pytest.approx(5.25, rel=1e-12)
     assert (scene.manoeuvres["way"].speed, scene.manoeuvres["way"].duration) == pytest.approx((8.5, 2.0), rel=1e-9)

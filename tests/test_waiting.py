@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from models.core.waiting import PROGRESS_FUNCTIONS, simulation_progress
+from models.core.waiting import PROGRESS_FUNCTIONS, report_simulation_progress
 from models.engines.assembly import Settings
 from models.engines.protocol import build
 from models.systems.pitch_plane.scene import assembly_of_scene
@@ -140,10 +140,10 @@ def test_time_left_follows_the_share_and_leaves_out_compiling(monkeypatch):
     assert shown.state()[1:] == (None, f"{2.0 + 2.0 * COMPILE_SECONDS_OF_SYSTEM['pitch-plane']:.0f} s so far")
     shown.compilations._end_compilation()
     assert shown.state() == ("six runs", 0.25, "30 s left")
-    with simulation_progress(lambda: 0.5):
+    with report_simulation_progress(lambda: 0.5):
         shown.state()
         now[0] += 8.0
         assert shown.state() == ("six runs", 0.5, "8 s left")
     assert not PROGRESS_FUNCTIONS
-    with simulation_progress(lambda: 1 / 0):
+    with report_simulation_progress(lambda: 1 / 0):
         assert shown.state()[1] == 0.0

@@ -51,15 +51,15 @@ def test_what_is_left_out_can_be_let_in_again():
     """A library that is there already stays, and what is let in is imported as ever."""
     code = """
 import json, sys, colorsys
-from models.machine.left_out import leave_out, let_in
-leave_out("wave", "colorsys")
+from models.machine.left_out import hide_libraries, show_libraries
+hide_libraries("wave", "colorsys")
 try:
     import wave
     refused = False
 except ImportError:
     refused = True
 kept = sys.modules["colorsys"] is colorsys
-let_in("wave", "colorsys", "chunk")
+show_libraries("wave", "colorsys", "chunk")
 import wave
 print(json.dumps([refused, kept, wave.__name__]))
 """
@@ -70,8 +70,8 @@ def test_nothing_is_left_out_that_this_process_has_looked_for_already():
     """A notebook that labels arrays and then calls the command: xarray keeps what it has seen of dask."""
     code = """
 import json, sys, xarray
-from models.machine.left_out import OF_LABELS, leave_out
-leave_out(*OF_LABELS)
+from models.machine.left_out import OF_LABELS, hide_libraries
+hide_libraries(*OF_LABELS)
 print(json.dumps([name for name in OF_LABELS if name in sys.modules and sys.modules[name] is None]))
 """
     assert last_line(code, ROOT) == []
@@ -80,8 +80,8 @@ print(json.dumps([name for name in OF_LABELS if name in sys.modules and sys.modu
 def test_units_are_read_where_a_run_left_their_library_out():
     code = """
 import json
-from models.machine.left_out import leave_out
-leave_out("pint")
+from models.machine.left_out import hide_libraries
+hide_libraries("pint")
 from models.measured.units import factor_to_si
 print(json.dumps(factor_to_si("kN", "force", "", "")))
 """

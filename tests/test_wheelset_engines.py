@@ -9,7 +9,7 @@ import pytest
 from models.core.errors import InputError, RunFailed
 from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_march import Marcher
-from models.engines.mujoco_quiet import installed
+from models.engines.mujoco_quiet import installed_callback
 from models.engines.wheelset import ExudynWheelset, MujocoWheelset
 from models.rail import equations as eq
 from models.rail.eigenvalues import hunting_wavelength, largest_growth_rate
@@ -89,7 +89,7 @@ def test_threads_agree_to_the_last_bit():
     model = built.model.model
     model.opt.timestep = 5e-4
     starts = np.array([joints_from_states(built.displaced_state(shift)) for shift in (1e-3, 3e-3, 5e-3)])
-    with installed(kernel_law(joint_forces)):
+    with installed_callback(kernel_law(joint_forces)):
         one, two = (Marcher(model, threads).run(starts, 50) for threads in (1, 2))
     assert one.tobytes() == two.tobytes()
 

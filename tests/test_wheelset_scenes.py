@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from models.core.assumptions import broken_of
+from models.core.assumptions import broken_assumptions_of
 from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import named_effects, scene_without
 from models.rail import equations as eq
@@ -201,5 +201,5 @@ def test_profiles_of_a_parameter_file_are_an_effect_that_its_file_has_to_drop(tm
 def test_creep_forces_beyond_friction_are_told(law, friction, doubt) -> None:
     short = {"duration": 0.02, "displacement": 1e-3}
     own = scene(contact={"law": law}, wheelset={"override": {"friction": friction}}, run=short)
-    told = [one for one in broken_of(run(own, "reference", 20.0)) if one.name == "no slip"]
+    told = [one for one in broken_assumptions_of(run(own, "reference", 20.0)) if one.name == "no slip"]
     assert bool(told) == doubt and all(np.isinf(one.worst) for one in told)

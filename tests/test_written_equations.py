@@ -10,10 +10,10 @@ from models.core.systems import load
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import PLAIN_ENGINE
 from models.engines.cut_vehicle import build as hub_model
-from models.engines.free_vehicle import Plain
+from models.engines.free_vehicle import PlainModel
 from models.multibody import forces as at
-from models.multibody.plain.road import control_value, surface
-from models.multibody.plain.rolling import Ledger, TyreReport
+from models.multibody.plain.road import control_value, road_surface
+from models.multibody.plain.rolling import EnergyLedger, TyreReport
 from models.road.plane_waves import plane_waves
 from models.systems.handling.run import build_in_engine, run
 from studies.command.asked import SCENES_FOLDER, requested_engines
@@ -71,19 +71,23 @@ def test_bristles_are_those_of_the_kernel():
 def test_roads_and_controls_are_those_of_the_kernel():
     waves, rng = plane_waves(4e-6, seed=2), np.random.default_rng(1)
     x, y = rng.uniform(-200.0, 200.0, (2, 50))
-    wanted = np.array([at.height(waves.ravel(), len(waves), *place) for place in zip(x, y, strict=True)])
-    assert np.column_stack(surface(waves, x, y)) == pytest.approx(wanted, abs=1e-12 * np.abs(wanted).max())
+    wanted = np.array(
+        [at.road_height_and_slopes(waves.ravel(), len(waves), *place) for place in zip(x, y, strict=True)]
+    )
+    assert np.column_stack(road_surface(waves, x, y)) == pytest.approx(wanted, abs=1e-12 * np.abs(wanted).max())
     knots = ((0.1, 0.2), (0.5, -0.3), (0.5 + 1e-9, 0.4), (2.0, 1.0))
     table = np.array(knots).T.ravel()
     for t in (-1.0, 0.1, 0.3, 0.5, 1.2345, 2.0, 3.0):
-        assert control_value(knots, t) == pytest.approx(at.control(table, 0, 0, len(knots), t), rel=1e-14, abs=1e-15)
+        assert control_value(knots, t) == pytest.approx(
+            at.control_value_and_rate(table, 0, 0, len(knots), t), rel=1e-14, abs=1e-15
+        )
     assert control_value(((0.7, 3.0),), 0.0) == (3.0, 0.0)
 
 
 def test_reports_have_the_columns_of_the_kernel():
     columns = [getattr(at, name.upper()) for name in TyreReport._fields]
     assert columns == list(range(at.REPORTED))
-    assert [getattr(at, name.upper()) for name in Ledger._fields] == list(range(at.LEDGER))
+    assert [getattr(at, name.upper()) for name in EnergyLedger._fields] == list(range(at.LEDGER))
 
 
 def test_engines_on_request_run_where_they_are_named():
@@ -117,7 +121,7 @@ def test_a_run_that_blows_up_fails():
         return np.full(len(q), np.inf)
 
     with pytest.raises(RunFailed):
-        Plain(PLAIN_ENGINE, blown, 1, Settings("RK4", 1e-3, 0.01)).run()
+        PlainModel(PLAIN_ENGINE, blown, 1, Settings("RK4", 1e-3, 0.01)).run()
 
 
 def test_curves_of_the_description_press():

@@ -40,7 +40,7 @@ def load(scene: AnyScene, set: Changes = None) -> "Scene":
     set : values by dotted keys that replace those of the scene; None as a value takes a key out. Files that a table
     names are looked for in the current folder. Raises InputError that names place, value and what is allowed.
     """
-    from models.core.scene_file import parse
+    from models.core.scene_file import parse_toml
     from studies.command.asked import scene_path
     from twinrig.scene import Scene, of_table
 
@@ -53,7 +53,7 @@ def load(scene: AnyScene, set: Changes = None) -> "Scene":
     if str(scene).endswith(".nc"):
         raise InputError(scene, "", None, "is no scene; twinrig.read reads a saved result")
     path = scene_path(str(scene))
-    return of_table(parse(path), path.name, path.parent, set or {})
+    return of_table(parse_toml(path), path.name, path.parent, set or {})
 
 
 def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool = True, **how: Any) -> "Result":
@@ -148,7 +148,7 @@ def _library_messages(scene: Any = None, **names: str) -> "Iterator[None]":
 
 def read(path: str | Path) -> "Result":
     """Read a result that ``Result.save`` or the command line has saved; raises InputError for another file."""
-    from models.core.result import load as load_result
+    from models.core.result import load_result
     from twinrig.result import Result
 
     return Result(load_result(Path(path)).data)

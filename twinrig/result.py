@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.core import result as saved
-from models.core.assumptions import BrokenAssumption, assumption_sentences, broken_of
-from models.core.discretisation import Estimate, errors_of
+from models.core.assumptions import BrokenAssumption, assumption_sentences, broken_assumptions_of
+from models.core.discretisation import Estimate, error_estimates_of
 from models.core.errors import InputError
-from models.core.told import figure_remarks, message_lines
+from models.core.told import figure_remarks, messages_on_results
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,12 +43,12 @@ class Result(saved.Result):
     @property
     def errors(self) -> dict[str, Estimate]:
         """Estimated error of each channel, with its unit; empty if no errors were estimated."""
-        return errors_of(self)
+        return error_estimates_of(self)
 
     @property
     def broken(self) -> list[BrokenAssumption]:
         """Assumptions that the run broke, each with place, duration, size, and remedy."""
-        return broken_of(self)
+        return broken_assumptions_of(self)
 
     @property
     def assumed(self) -> list[str]:
@@ -71,7 +71,11 @@ class Result(saved.Result):
             f"  {query['weight']}: {query['text']}" for query in queries
         ]
         system_and_engine = dict.fromkeys(str(attributes.get(key, "")) for key in ("system", "engine"))
-        return [f"  {' '.join(filter(None, system_and_engine))}: {parts}", *doubts, *message_lines({self._label: self})]
+        return [
+            f"  {' '.join(filter(None, system_and_engine))}: {parts}",
+            *doubts,
+            *messages_on_results({self._label: self}),
+        ]
 
     def _rows(self) -> list[tuple[str, str, str, str, str, str]]:
         """Texts of name, unit, axes, least value, largest value and meaning of each channel."""

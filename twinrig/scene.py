@@ -58,7 +58,7 @@ class Scene:
 def of_table(table: Mapping[str, Any], file: str, folder: Path, changes: Mapping[str, Any]) -> Scene:
     """The checked scene of a table with values changed by dotted keys; the table itself is unchanged."""
     from models.core.scene_file import set_key
-    from models.core.systems import of_table as checked
+    from models.core.systems import scene_of_table as checked
     from studies.command.asked import KNOWN_SYSTEMS
 
     if not isinstance(changes, Mapping):

@@ -20,7 +20,7 @@ from models.bicycle.whipple import NO_CONTROL, SteeringControl, Whipple
 from models.contact.fastsim_many import LOAD, MU, A, B
 from models.core.errors import InputError
 from models.core.strict import Strict, quantity
-from models.engines.free_vehicle import Driven
+from models.engines.free_vehicle import LoadedVehicle
 from models.machine.compiled import lean
 from models.machine.stack import array, at, beyond, doubles, row, start
 from models.multibody import forces, tree
@@ -37,9 +37,9 @@ from models.multibody.forces import (
     workspace_size,
 )
 from models.multibody.moving_vehicle import WheelContact, carried_velocity
-from models.multibody.tree import cross, dot, plus, put, three, times
+from models.multibody.tree import cross, dot, plus, put_three, three_from, times
 from models.tyre.bristles import FIRST_FLEXIBILITY, cornering_stiffness_factor, patch_grid, tyre_forces
-from models.vehicles.free_vehicle import joints
+from models.vehicles.free_vehicle import joint_table
 from models.vehicles.spatial import SpatialVehicle
 
 WHEEL_COUNT = 2
@@ -93,10 +93,10 @@ class RollingBicycle:
         object.__setattr__(self, "numbers", _table(self))
 
     @property
-    def driven(self) -> Driven:
+    def driven(self) -> LoadedVehicle:
         """Description from which an engine builds the bicycle."""
         gravity = np.array([0.0, 0.0, -self.bicycle.gravity])
-        return Driven(self.vehicle, gravity, self.numbers, bicycle_forces, set_bicycle_forces)
+        return LoadedVehicle(self.vehicle, gravity, self.numbers, bicycle_forces, set_bicycle_forces)
 
     def report(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Reports (n, 2, REPORTED) of the tyres and energy ledgers (n, LEDGER), columns of ``models.multibody.forces``,
@@ -117,7 +117,7 @@ class RollingBicycle:
 
 def _table(bicycle: RollingBicycle) -> np.ndarray:
     """Table of all numbers that the bicycle's compiled forces read."""
-    c, patch, rows = bicycle.control, patch_grid(bicycle.tyre.cells), joints(bicycle.vehicle)
+    c, patch, rows = bicycle.control, patch_grid(bicycle.tyre.cells), joint_table(bicycle.vehicle)
     counts = [len(body.freedoms) for body in bicycle.vehicle.bodies for _ in body.freedoms]
     rows[[REAR, FRONT], tree.KIND] = tree.LOOSE
     positions = {body.name: body.position for body in bicycle.vehicle.bodies}
@@ -182,13 +182,13 @@ def _tyre_load(tyre_parameters, vehicle, wheel_contact):
         row(vehicle.tree.links, tree.PER_LINK, int(tyre_parameters[forces.KNUCKLE])),
         vehicle.rates[int(tyre_parameters[forces.ROTOR])],
     )
-    axle, centre = three(link, tree.TURNED + 3), three(spot, tree.WHERE)
+    axle, centre = three_from(link, tree.TURNED + 3), three_from(spot, tree.WHERE)
     flat = math.sqrt(1.0 - axle[2] * axle[2])
     arm = times(plus(times(axle, axle[2]), (0.0, 0.0, -1.0)), tyre_parameters[forces.RADIUS] / flat)
     along = times((axle[1], -axle[0], 0.0), 1.0 / flat)
     across = (-along[1], along[0], 0.0)
-    turning = plus(plus(three(link, tree.TURNING), (0.0, 0.0, vehicle.frame.yaw_rate)), times(axle, spin))
-    sliding = plus(plus(three(spot, tree.RATE), carried_velocity(vehicle.frame, centre)), cross(turning, arm))
+    turning = plus(plus(three_from(link, tree.TURNING), (0.0, 0.0, vehicle.frame.yaw_rate)), times(axle, spin))
+    sliding = plus(plus(three_from(spot, tree.RATE), carried_velocity(vehicle.frame, centre)), cross(turning, arm))
     elastic = max(
         tyre_parameters[forces.STATIC]
         + tyre_parameters[forces.VERTICAL] * (tyre_parameters[forces.RADIUS] * flat - centre[2]),
@@ -209,14 +209,14 @@ def _tyre_load(tyre_parameters, vehicle, wheel_contact):
     )
     report[PRESS] = load
     report[forces.SLIP_X], report[forces.SLIP_Y], report[forces.TURN] = slip[0], slip[1], slip[2]
-    put(way, forces.CENTRE, centre)
-    put(way, forces.DOWN, arm)
-    put(way, forces.ROLLING, along)
-    put(way, forces.ACROSS, across)
-    put(way, forces.NORMAL, (0.0, 0.0, 1.0))
-    put(way, forces.AXLE, axle)
-    put(way, forces.LOADING, (0.0, 0.0, load))
-    tree.twist(link, vehicle.tree.ground, cross(arm, (0.0, 0.0, load)))
+    put_three(way, forces.CENTRE, centre)
+    put_three(way, forces.DOWN, arm)
+    put_three(way, forces.ROLLING, along)
+    put_three(way, forces.ACROSS, across)
+    put_three(way, forces.NORMAL, (0.0, 0.0, 1.0))
+    put_three(way, forces.AXLE, axle)
+    put_three(way, forces.LOADING, (0.0, 0.0, load))
+    tree.add_body_moment(link, vehicle.tree.ground, cross(arm, (0.0, 0.0, load)))
 
 
 @lean

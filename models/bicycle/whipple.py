@@ -17,7 +17,7 @@ from numpy.polynomial import Polynomial
 from pydantic import Field, model_validator
 
 from models.core.errors import InputError
-from models.core.scene_file import existing_file, parse
+from models.core.scene_file import existing_file, parse_toml
 from models.core.strict import Strict, quantity, read
 
 PARAMETER_SET_FOLDER = Path(__file__).parents[1] / "vehicles" / "parameters" / "bicycles"
@@ -273,7 +273,7 @@ def load_bicycle(
             tuple(sets),
         )
     path = sets.get(bicycle_name) or existing_file(bicycle_name, Path(scene_folder), scene_path, key_path)
-    bicycle = read(Whipple, parse(path), path.name)
+    bicycle = read(Whipple, parse_toml(path), path.name)
     try:
         bicycle.linear  # noqa: B018
     except InputError as error:

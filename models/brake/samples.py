@@ -220,10 +220,12 @@ class CompiledSamples:
 
 def compiled_samples(step_function: Callable[..., Any], cache_name: str) -> CompiledSamples:
     """Compiled samples that advance the vehicle by a compiled step function."""
-    compiled_some = inlined(named_closure(_function_with_globals(advance_some_samples, go=step_function), cache_name))
+    compiled_some = inlined(
+        closure_with_unique_name(_function_with_globals(advance_some_samples, go=step_function), cache_name)
+    )
     return CompiledSamples(
         njit(cache=True, error_model="numpy")(
-            named_closure(_function_with_globals(sample_generator, some=compiled_some), cache_name)
+            closure_with_unique_name(_function_with_globals(sample_generator, some=compiled_some), cache_name)
         )
     )
 

@@ -17,8 +17,8 @@ import numpy as np
 
 from models.brake.plane_vehicle import PlaneVehicle, Truck, TruckAxle, plane_of_truck
 from models.core.errors import InputError
-from models.multibody.numbers import Handling, Tyres
-from models.vehicles.free_vehicle import CARRIER, SWAY, spinning
+from models.multibody.numbers import Handling, TyreParameters
+from models.vehicles.free_vehicle import CARRIER, SWAY, wheel_spin_inertia
 from models.vehicles.spatial import Body, Freedom, SpatialVehicle, Tyre, Vector, hitch_of
 
 ROLL, PITCH = 4, 5
@@ -158,7 +158,7 @@ def suspended_vehicle(
     _check_trailer_row(vehicle)
     inertias = _wheel_inertias(vehicle.name, tyres, spin_inertia)
     centred = _displaced_vehicle(replace(vehicle, tyres=tuple(tyres)), -centre_of_mass(vehicle))
-    handling = Handling(centred, Tyres(spin_inertia=0.0), forces=trailer_spring_code)
+    handling = Handling(centred, TyreParameters(spin_inertia=0.0), forces=trailer_spring_code)
     if handling.vehicle.coordinates()[: len(LEADING_COORDINATES)] != LEADING_COORDINATES:
         raise ValueError("the carrier and the sway are not the first bodies")
     return SprungVehicle(handling, _plane_truck(centred, inertias, front_roll_share), tuple(inertias))
@@ -191,7 +191,7 @@ def _wheel_inertias(vehicle_name: str, tyres: list[Tyre], spin_inertia: float) -
     """Inertias (kg m^2) of the wheels with these tyres, axle by axle; InputError unless both wheels of an axle are
     equal.
     """
-    inertias = [spinning(tyre, spin_inertia) for tyre in tyres]
+    inertias = [wheel_spin_inertia(tyre, spin_inertia) for tyre in tyres]
     for number, (tyre, inertia) in enumerate(zip(tyres, inertias, strict=True)):
         if not inertia > 0.0 or inertia != inertias[number ^ 1]:
             allowed = "kg m^2 of its spin must be above 0, and the same for both wheels of its axle"

@@ -49,7 +49,7 @@ from models.multibody.forces import (
     workspace_size,
 )
 from models.multibody.moving_vehicle import WheelContact
-from models.multibody.tree import PER_LINK, dot, three, times, twist
+from models.multibody.tree import PER_LINK, add_body_moment, dot, three_from, times
 
 VALUES_PER_WHEEL = 4
 """Number of values that stay constant over a step for each wheel."""
@@ -114,12 +114,12 @@ def forces_and_contacts(force_table, q, v, force_sum, wheel_contacts):
     for i in range(int(force_table[TYRES])):
         tyre_row = row(tyres, PER_TYRE, i)
         find_contact(tyre_row, waves, int(force_table[WAVES]), wheel_forces.steer[i], 0.0, vehicle, wheel)
-        wheel_contacts.along[i] = dot(three(wheel_geometry, PASSING), three(wheel_geometry, ROLLING))
+        wheel_contacts.along[i] = dot(three_from(wheel_geometry, PASSING), three_from(wheel_geometry, ROLLING))
         wheel_contacts.across[i], wheel_contacts.load[i] = wheel.report[SLIP_Y], wheel.report[PRESS]
         creeping[0], creeping[1] = wheel_forces.force_x[i], wheel_forces.force_y[i]
         add_creep_forces(tyre_row, creeping, vehicle, wheel)
         carrying = row(vehicle.tree.links, PER_LINK, int(tyre_row[CARRYING]))
-        twist(carrying, vehicle.tree.ground, times(three(wheel_geometry, AXLE), -wheel_forces.moment[i]))
+        add_body_moment(carrying, vehicle.tree.ground, times(three_from(wheel_geometry, AXLE), -wheel_forces.moment[i]))
     finish_forces(force_table, vehicle)
 
 
@@ -359,4 +359,4 @@ def advance_with(**engine_functions: Callable[..., Any]) -> Callable[..., Any]:
 
 def compiled(cache_name: str, **engine_functions: Callable[..., Any]) -> Callable[..., Any]:
     """Compiled version of ``advance_with``, for an engine's compiled functions."""
-    return njit(cache=True, error_model="numpy")(named_closure(advance_with(**engine_functions), cache_name))
+    return njit(cache=True, error_model="numpy")(closure_with_unique_name(advance_with(**engine_functions), cache_name))

@@ -35,8 +35,8 @@ from models.contact.inputs import (
 from models.contact.linear_theory import LARGEST_PATCH, coefficient_at, flexibilities_at
 from models.core.errors import InputError
 from models.machine.compiled import compiled
-from models.machine.records import record, records, size_of, stacked
-from models.machine.stack import array, ask, beyond, doubles
+from models.machine.records import record, records_at_pointer, size_of, stack_records
+from models.machine.stack import array, beyond, call_at_address, doubles
 
 INPUT_RECORD = record("shape_x", "shape_y", "pressing", "mu", "xi_x", "xi_y", "spin", "G", "nu")
 """Record of the inputs, as in ``kernel.h``: A, B (1/m) or a, b (m); load (N) or approach (m); mu; xi_x, xi_y; spin
@@ -100,9 +100,9 @@ def solve_contact(input_kind, input_pointer, table_pointer, output_pointer):
     all over.
     """
     values, out, head = (
-        records(input_pointer, 1, INPUT_RECORD)[0],
-        records(output_pointer, 1, OUTPUT_RECORD)[0],
-        records(table_pointer, 1, DISTANCE_HEAD)[0],
+        records_at_pointer(input_pointer, 1, INPUT_RECORD)[0],
+        records_at_pointer(output_pointer, 1, OUTPUT_RECORD)[0],
+        records_at_pointer(table_pointer, 1, DISTANCE_HEAD)[0],
     )
     any_shape, answers = head.cells < 0.0, array(output_pointer, (OUTPUT_COUNT,))
     status = _input_status(input_kind, values, array(input_pointer, (INPUT_COUNT,)), any_shape)
@@ -110,7 +110,7 @@ def solve_contact(input_kind, input_pointer, table_pointer, output_pointer):
     if status != FINE or (values.pressing <= 0.0 and not any_shape):
         return status
     if any_shape:
-        return ask(int(head.law), input_pointer, table_pointer, output_pointer)
+        return call_at_address(int(head.law), input_pointer, table_pointer, output_pointer)
     if not _fill_normal_contact(input_kind, values, out):
         answers[:] = math.nan
         return NOT_PLAUSIBLE
@@ -201,7 +201,7 @@ def _fill_linear_forces(input_record, output_record):
 @compiled
 def _fill_fastsim_forces(input_record, table_pointer, output_record):
     """Fill the forces of FASTSIM on one ellipse, as by ``fastsim_many.forces``, with all arrays on the stack."""
-    head = records(table_pointer, 1, GRID_HEAD)[0]
+    head = records_at_pointer(table_pointer, 1, GRID_HEAD)[0]
     n, first = int(head.cells), int(head.first)
     wide = n * min(max((0.5 / (output_record.a / output_record.b)) ** 0.6, 1.0), 1.0 * STRIPS_PER_CELL_LIMIT)
     m = 2 * math.ceil(wide / 2.0 - 1e-9)
@@ -209,7 +209,7 @@ def _fill_fastsim_forces(input_record, table_pointer, output_record):
     at = GRID_HEAD_SIZE + 5 * n + k * (1 + 4 * first) + 4 * k * (k - 1)
     strips = strips_in(array(beyond(table_pointer, at + 1), (4, m)))
     cells = cells_in(array(beyond(table_pointer, GRID_HEAD_SIZE), (5, n)), array(beyond(table_pointer, at), (1,))[0])
-    contacts, answers = stacked(1, CONTACT), stacked(1, FORCES)
+    contacts, answers = stack_records(1, CONTACT), stack_records(1, FORCES)
     contact, answer = contacts[0], answers[0]
     contact.a, contact.b, contact.load, contact.mu = (
         output_record.a,
@@ -221,7 +221,7 @@ def _fill_fastsim_forces(input_record, table_pointer, output_record):
     contact.l1, contact.l2, contact.l3 = flexibilities_at(
         output_record.a, output_record.b, input_record.G, input_record.nu
     )
-    workspace = MarchWorkspace(stacked(1, SLIP), stacked(1, BLOCK))
+    workspace = MarchWorkspace(stack_records(1, SLIP), stack_records(1, BLOCK))
     fill_contact_forces_in_place(contacts, strips, cells, BLENDED, SECOND_ORDER, workspace, answers)
     output_record.fx, output_record.fy, output_record.mz, output_record.stick = (
         answer.fx,

@@ -41,7 +41,7 @@ from models.contact.simplified_theory import (
 from models.contact.undeformed_distance import UndeformedDistance
 from models.core.errors import InputError
 from models.machine.compiled import compiled
-from models.machine.records import record, records, size_of
+from models.machine.records import record, records_at_pointer, size_of
 from models.machine.stack import DOUBLES, array, beyond
 
 TABLE_HEAD = record(
@@ -115,7 +115,7 @@ def distance_table(
 @compiled
 def surface_at(table_pointer, depth):
     """``PatchSurface`` of the patch at a depth (m), as ``Patch.surface`` gives it, from its table."""
-    head = records(table_pointer, 1, TABLE_HEAD)[0]
+    head = records_at_pointer(table_pointer, 1, TABLE_HEAD)[0]
     m, n = int(head.lines_x), int(head.lines_y)
     x, y = (
         array(beyond(table_pointer, TABLE_HEAD_SIZE), (2, m)),
@@ -132,7 +132,7 @@ def surface_at(table_pointer, depth):
 @compiled
 def fit_at_depth(table_pointer, depth, contact_modulus):
     """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA of the patch at a depth (m)."""
-    head = records(table_pointer, 1, TABLE_HEAD)[0]
+    head = records_at_pointer(table_pointer, 1, TABLE_HEAD)[0]
     return coarse_fit(surface_at(table_pointer, depth), int(head.net), int(head.shape), int(head.fit), contact_modulus)
 
 
@@ -143,7 +143,7 @@ def depth_at_approach(table_pointer, approach, contact_modulus):
 
     False position by Illinois' rule: the approach grows with the depth, for one valley in proportion.
     """
-    head = records(table_pointer, 1, TABLE_HEAD)[0]
+    head = records_at_pointer(table_pointer, 1, TABLE_HEAD)[0]
     low, most = head.low, head.edge - head.low
     over = approach - low
     left, off_left, right, off_right = 0.0, -over, 0.0, -over
@@ -182,9 +182,9 @@ def solve_simplified(input_pointer, table_pointer, output_pointer):
     distance.
     """
     values, out, head = (
-        records(input_pointer, 1, INPUT_RECORD)[0],
-        records(output_pointer, 1, OUTPUT_RECORD)[0],
-        records(table_pointer, 1, TABLE_HEAD)[0],
+        records_at_pointer(input_pointer, 1, INPUT_RECORD)[0],
+        records_at_pointer(output_pointer, 1, OUTPUT_RECORD)[0],
+        records_at_pointer(table_pointer, 1, TABLE_HEAD)[0],
     )
     answers = array(output_pointer, (OUTPUT_COUNT,))
     answers[:] = 0.0
@@ -205,7 +205,7 @@ def _fill_rolling_forces(input_record, table_pointer, depth, stiffness, output_r
     """Fill the rolling forces of the patch at a depth (m) in ``output_record``, whose load is known, as
     ``simplified_theory.roll`` does.
     """
-    surface, head = surface_at(table_pointer, depth), records(table_pointer, 1, TABLE_HEAD)[0]
+    surface, head = surface_at(table_pointer, depth), records_at_pointer(table_pointer, 1, TABLE_HEAD)[0]
     box, cells, meshes = surface.box, -int(head.cells), int(head.net)
     net = fine_strips(surface, cells, cells, int(head.shape))
     scale_pressure_to_load(net, output_record.load)

@@ -18,7 +18,7 @@ deviations."""
 
 
 @dataclass(frozen=True)
-class Gaussian:
+class GaussianValues:
     """Normally distributed quantities known only by their means and standard deviations (rows,); ``rows`` labels each
     of them, such as "at 20 m/s"."""
 
@@ -27,7 +27,7 @@ class Gaussian:
     rows: Sequence[str] = ()
 
 
-Watched = Mapping[str, np.ndarray | Gaussian]
+Watched = Mapping[str, np.ndarray | GaussianValues]
 """Values of a quantity at every row of a run, by the name of the wheel, strut or joint."""
 
 
@@ -111,7 +111,7 @@ def worst_violation(run_result: Result, assumption: Assumption) -> BrokenAssumpt
     judged."""
     judged = [
         _gaussian_violation(run_result, assumption, value_name, values)
-        if isinstance(values, Gaussian)
+        if isinstance(values, GaussianValues)
         else _sampled_violation(run_result, assumption, value_name, np.asarray(values, float))
         for value_name, values in assumption.watched_values(run_result).items()
     ]
@@ -149,7 +149,7 @@ def _sampled_violation(
 
 
 def _gaussian_violation(
-    run_result: Result, assumption: Assumption, place_name: str, gaussian_values: Gaussian
+    run_result: Result, assumption: Assumption, place_name: str, gaussian_values: GaussianValues
 ) -> BrokenAssumption | None:
     """The violation by the normally distributed quantity that exceeds a limit for the largest share of the time; None
     if no share is above ALLOWED_TIME_SHARE."""
@@ -206,7 +206,7 @@ def assumption_lines(assumptions: Iterable[Assumption], line_width: int = 10) ->
     return [f"  {'assumes':<{line_width}} {assumption.says} ({assumption.allowed})" for assumption in assumptions]
 
 
-def broken_of(run_result: Result) -> list[BrokenAssumption]:
+def broken_assumptions_of(run_result: Result) -> list[BrokenAssumption]:
     """Violated assumptions that are stored in a result."""
     stored: dict[str, Any] = json.loads(run_result.data.attrs.get("assumptions", "{}"))
     return [BrokenAssumption(**entry) for entry in stored.get("broken", ())]
@@ -219,13 +219,13 @@ def assumption_sentences(run_result: Result) -> list[str]:
 
 
 @contextmanager
-def collected_breaches() -> Iterator[dict[str, BrokenAssumption]]:
+def collected_broken_assumptions() -> Iterator[dict[str, BrokenAssumption]]:
     """Context that collects the assumptions violated by the results checked inside: the worst violation of each, by
     name."""
     worst: dict[str, BrokenAssumption] = {}
 
     def note(run_result: Result) -> None:
-        for breach in broken_of(run_result):
+        for breach in broken_assumptions_of(run_result):
             if breach.name not in worst or breach.share > worst[breach.name].share:
                 worst[breach.name] = breach
 

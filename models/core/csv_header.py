@@ -133,7 +133,7 @@ def is_number(cell_text: str) -> bool:
     return NUMBER_PATTERN.fullmatch(cell_text) is not None
 
 
-def find_head(
+def find_heads_above_numbers(
     file_lines: Sequence[FileLine], is_known_heading: Callable[[str], bool], separators: Sequence[str]
 ) -> list[TableHead]:
     """Headings in the first line that stands above a row of numbers: one ``TableHead`` for each separator that splits
@@ -207,7 +207,7 @@ def plain_text(csv_path: str | Path, file_text: str, wanted_headings: Collection
     lines = [FileLine(i, line, i, i) for i, line in enumerate(file_text.split("\n"), start=1)]
     declared_separator = separator_line(lines[0].text)
     used = [line for line in lines[bool(declared_separator) :] if line.text.strip() and not line.text.startswith("#")]
-    heads = find_head(
+    heads = find_heads_above_numbers(
         used,
         lambda cell: name_and_unit(cell)[0] in wanted_headings,
         (declared_separator,) if declared_separator else tuple(SEPARATORS),

@@ -97,7 +97,7 @@ def observed_order(fine_difference: float, coarse_difference: float, declared_or
     return float(np.clip(math.log2(coarse_difference / fine_difference), LEAST_ORDER, declared_order))
 
 
-def estimate(
+def error_estimate(
     fine_values: np.ndarray,
     coarse_values: np.ndarray,
     declared_order: float,
@@ -142,7 +142,7 @@ def nearest_rows(times: np.ndarray, wanted_times: np.ndarray) -> np.ndarray:
     return row_after - (wanted_times - times[row_after - 1] < times[row_after] - wanted_times)
 
 
-class Series(NamedTuple):
+class RunSeries(NamedTuple):
     """Channels (n, ...) of a run by name, at times (n,) in s, with units of the channels that the run's result does not
     contain."""
 
@@ -151,14 +151,14 @@ class Series(NamedTuple):
     units: Mapping[str, str] = MappingProxyType({})
 
 
-Rerun = Callable[[float, float], Series]
+Rerun = Callable[[float, float], RunSeries]
 """Function that repeats a run in steps ``factor`` times as long over a ``share`` of its time: from the start if steps
 are longer or the share is 1. Raises InputError or RunFailed where that is impossible."""
 
 
 def with_estimated_errors(
     run_result: Result,
-    fine_run: Series,
+    fine_run: RunSeries,
     run_again: Rerun,
     convergence_order: float,
     time_step: float,
@@ -185,7 +185,7 @@ def with_estimated_errors(
 
 
 def step_errors(
-    fine_run: Series,
+    fine_run: RunSeries,
     run_again: Rerun,
     convergence_order: float,
     time_step: float,
@@ -214,7 +214,7 @@ def step_errors(
 
 
 def _by_longer_steps(
-    fine_run: Series, run_again: Rerun, convergence_order: float, time_step: float
+    fine_run: RunSeries, run_again: Rerun, convergence_order: float, time_step: float
 ) -> dict[str, Estimate]:
     """Estimated errors by channel from runs in twice the step and, over a part, four times the step."""
     coarse = _comparable_coarse_run(fine_run, run_again(2.0, 1.0), time_step)
@@ -223,12 +223,12 @@ def _by_longer_steps(
         coarser = _comparable_coarse_run(coarse, run_again(4.0, REPEATED_SHARE), time_step).channels
     rows = nearest_rows(fine_run.times, coarse.times)
     return {
-        name: estimate(values[rows], coarse.channels[name], convergence_order, time_step, coarser.get(name))
+        name: error_estimate(values[rows], coarse.channels[name], convergence_order, time_step, coarser.get(name))
         for name, values in fine_run.channels.items()
     }
 
 
-def _comparable_coarse_run(fine_run: Series, coarse_run: Series, time_step: float) -> Series:
+def _comparable_coarse_run(fine_run: RunSeries, coarse_run: RunSeries, time_step: float) -> RunSeries:
     """The run in longer steps, unchanged; raises RunFailed where it has no row besides the start, or lasts longer than
     the finer run.
 
@@ -240,7 +240,7 @@ def _comparable_coarse_run(fine_run: Series, coarse_run: Series, time_step: floa
 
 
 def _by_half_steps(
-    fine_run: Series, run_again: Rerun, convergence_order: float, time_step: float, error_growth: Mapping[str, float]
+    fine_run: RunSeries, run_again: Rerun, convergence_order: float, time_step: float, error_growth: Mapping[str, float]
 ) -> dict[str, Estimate]:
     """Estimated errors by channel from part of the run, or all of a short one, repeated with half the step; scaled to
     the run's step by the order of the method, and to the rest of the run by the error's growth."""
@@ -250,7 +250,7 @@ def _by_half_steps(
     rows = nearest_rows(finer.times, fine_run.times[in_finer_run])
     estimates = {}
     for name, values in fine_run.channels.items():
-        error = estimate(finer.channels[name][rows], values[in_finer_run], convergence_order, time_step)
+        error = error_estimate(finer.channels[name][rows], values[in_finer_run], convergence_order, time_step)
         later = max(
             _growth_after_window(values[in_finer_run] - finer.channels[name][rows], values) if in_finer_run[0] else 1.0,
             error_growth.get(name, 1.0),
@@ -298,8 +298,8 @@ def _whole_divisor(least_divisor: float) -> int:
 
 def with_tolerance_error(
     run_result: Result,
-    fine_run: Series,
-    looser_run: Series,
+    fine_run: RunSeries,
+    looser_run: RunSeries,
     tolerance_ratio: float,
     solver_tolerance: float,
     channel_sizes: Mapping[str, float] | None = None,
@@ -389,7 +389,7 @@ def with_stated_errors(
     return run_result
 
 
-def errors_of(run_result: Result) -> dict[str, Estimate]:
+def error_estimates_of(run_result: Result) -> dict[str, Estimate]:
     """Error estimates stored in a result, by channel; empty if no estimate was made."""
     stored = json.loads(run_result.data.attrs.get("error", "{}"))
     return {name: Estimate(**values) for name, values in stored.get("channels", {}).items()}
@@ -442,13 +442,13 @@ def sampling_error(standard_error: float, channel_size: float, channel_unit: str
 
 def largest_estimate(run_result: Result) -> Estimate | None:
     """The error estimate with the largest share in a result; None if there are no estimates."""
-    return max(errors_of(run_result).values(), key=lambda estimate: estimate.share, default=None)
+    return max(error_estimates_of(run_result).values(), key=lambda estimate: estimate.share, default=None)
 
 
 def error_lines(run_result: Result) -> list[str]:
     """Printed lines on a result's error: the worst channel for the time step and the worst for cells, with a warning
     and advice if needed, then the errors of the theory and of the sample."""
-    stored, estimates = json.loads(run_result.data.attrs.get("error", "{}")), errors_of(run_result)
+    stored, estimates = json.loads(run_result.data.attrs.get("error", "{}")), error_estimates_of(run_result)
     text = [f"error not estimated: {stored['why']}"] if "why" in stored else []
     shares = {name: estimate.share for name, estimate in sorted(estimates.items(), key=lambda entry: entry[1].share)}
     worst = {estimates[name].of: name for name in shares}

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-Weight = Literal["error", "doubt", "note"]
+FindingWeight = Literal["error", "doubt", "note"]
 """Severity of a finding: an error stops the processing, a doubt is repeated in the report, and a note states what was
 checked and is in order."""
 
@@ -22,7 +22,7 @@ class Finding:
     """
 
     check: str
-    weight: Weight
+    weight: FindingWeight
     place: str
     text: str
     size: float | None = None

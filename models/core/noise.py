@@ -44,14 +44,14 @@ def normal_block(
     seed : 0 to 2**64 - 1; noise_path : 0 to 2**64 - 1; block_index : 0 to 2**64 - 1; InputError for others, which would
     name the stream of another one. Philox with the key (seed, path), the block in the counter's third word and the
     source in its fourth, so that blocks never overlap."""
-    key = np.array([_whole_number("seed", seed), _whole_number("path", noise_path)], dtype=np.uint64)
+    key = np.array([_checked_whole_number("seed", seed), _checked_whole_number("path", noise_path)], dtype=np.uint64)
     bits = np.random.Philox(
-        key=key, counter=np.array([0, 0, _whole_number("block", block_index), noise_source], dtype=np.uint64)
+        key=key, counter=np.array([0, 0, _checked_whole_number("block", block_index), noise_source], dtype=np.uint64)
     )
     return np.random.Generator(bits).standard_normal((row_count, channel_count))
 
 
-def _whole_number(number_name: str, number: int) -> int:
+def _checked_whole_number(number_name: str, number: int) -> int:
     """The number as int; raises InputError unless it is a whole number from 0 to 2**64 - 1."""
     if isinstance(number, bool) or not isinstance(number, int | np.integer) or not 0 <= number < 2**64:
         raise InputError("", number_name, number, "must be a whole number from 0 to 2^64 - 1")

@@ -6,7 +6,7 @@ from models.machine.compiled import njit
 
 
 @njit(cache=True)
-def evaluate(coefficients, sampling_period, start_time, time_step, sample_count, derivative_count):
+def piecewise_values(coefficients, sampling_period, start_time, time_step, sample_count, derivative_count):
     """Values of a piecewise polynomial at the times start_time + i step, followed by its derivatives up to the order
     ``derivative_count``: shape (sample_count, columns (derivatives + 1)).
 
@@ -32,7 +32,7 @@ def evaluate(coefficients, sampling_period, start_time, time_step, sample_count,
 
 
 @njit(cache=True, nogil=True)
-def interpolate(samples, row_indices, period_fractions):
+def interpolated_rows(samples, row_indices, period_fractions):
     """Samples interpolated linearly, shape (m, columns): between row ``row_indices`` (m,) of ``samples`` (n, columns)
     and the next row, at the ``period_fractions`` (m,) of a period."""
     rows, columns = samples.shape

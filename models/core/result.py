@@ -177,7 +177,7 @@ def result_from_table(scene: Any, table_rows: Sequence[Mapping[str, Any]], axis_
     )
 
 
-def load(result_path: Path) -> Result:
+def load_result(result_path: Path) -> Result:
     """Read a saved result from a netCDF file; raises InputError if the file holds none."""
     import xarray as xr
 
@@ -231,6 +231,6 @@ def _processor_name() -> str:
     return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown processor")
 
 
-def write(dataset: "xr.Dataset", output_path: Path) -> None:
+def write_dataset(dataset: "xr.Dataset", output_path: Path) -> None:
     """Write an xarray Dataset as a netCDF file, as ``Result.save`` does."""
     Result(dataset).save(output_path)

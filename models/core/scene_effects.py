@@ -1,7 +1,7 @@
 """Modelling effects that scenes name: entries of the system's table of effects, and files of its folder of effects.
 
-A system's ``effects`` is the package that holds them. What a key of the system's own tables names is a line (``Entry``)
-of its ``TABLE``; an effect with physics or code of its own has a file, which nothing registers. The file has
+A system's ``effects`` is the package that holds them. What a key of the system's own tables names is an
+``EffectEntry`` of its ``TABLE``; an effect with physics or code of its own has a file, which nothing registers. It has
 
 - a docstring, whose first sentence is its line in every list;
 - ``COST``, one sentence on what it takes;
@@ -33,7 +33,7 @@ Table = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Entry:
+class EffectEntry:
     """Entry in a system's table of effects, for an effect that is named by a key of the system's own tables.
 
     says : what it is, a sentence; place : the key, as "port.teeth"; cost : what it takes, a sentence; counts : what it
@@ -114,23 +114,21 @@ class Effect:
         vars(self).update(attributes)
 
 
-def _effect_of_entry(table_entry: Entry) -> Effect:
+def _effect_of_entry(entry: EffectEntry) -> Effect:
     """An ``Effect`` made from an entry of a system's table, with the attribute names of an effect's file."""
     field_names = ("place", "cost", "needs", "excludes", "why", "after", "modules", "channels")
-    known = {key.upper(): getattr(table_entry, key) for key in field_names}
-    known |= {"COUNTS": {"all": table_entry.counts, **table_entry.in_engines}} if table_entry.counts else {}
-    known |= {"__doc__": table_entry.says, "named": table_entry.named, "leave_out": table_entry.drop}
-    return Effect(
-        known if table_entry.usual_value is None and table_entry.put_in is None else known | {"put_in": table_entry.add}
-    )
+    known = {key.upper(): getattr(entry, key) for key in field_names}
+    known |= {"COUNTS": {"all": entry.counts, **entry.in_engines}} if entry.counts else {}
+    known |= {"__doc__": entry.says, "named": entry.named, "leave_out": entry.drop}
+    return Effect(known if entry.usual_value is None and entry.put_in is None else known | {"put_in": entry.add})
 
 
-def names_of(system_name: str) -> tuple[str, ...]:
+def effect_names_of(system_name: str) -> tuple[str, ...]:
     """Names of all effects that scenes of a system may have, listed without importing the effects' files."""
-    return tuple(sorted({*_effect_files(system_name), *_table(system_name)}))
+    return tuple(sorted({*_effect_files(system_name), *_entries_of_system(system_name)}))
 
 
-def _table(system_name: str) -> Mapping[str, Entry]:
+def _entries_of_system(system_name: str) -> Mapping[str, EffectEntry]:
     """Entries of a system's table of effects, by effect name; empty if all its effects are in files."""
     package = SYSTEMS[system_name].effects
     return getattr(import_module(package), "TABLE", {}) if package else {}
@@ -146,7 +144,7 @@ def _effect_files(system_name: str) -> dict[str, Path]:
 def effect_sentences(system_name: str) -> dict[str, str]:
     """First sentence on each effect of a system, by effect name, read without importing the effect's file."""
     says = {name: _first_sentence(file) for name, file in _effect_files(system_name).items()}
-    says |= {name: entry.says.rstrip(".") for name, entry in _table(system_name).items()}
+    says |= {name: entry.says.rstrip(".") for name, entry in _entries_of_system(system_name).items()}
     return dict(sorted(says.items()))
 
 
@@ -159,17 +157,16 @@ def _first_sentence(effect_file: Path) -> str:
     return text.partition("\n")[0].rstrip(".")
 
 
-def module_of(system_name: str, effect_name: str) -> Any:
+def effect_of(system_name: str, effect_name: str) -> Any:
     """The ``Effect`` of a name, from the system's table or from the effect's own file. Raises InputError for an unknown
     name, or a file that lacks something."""
-    if entry := _table(system_name).get(effect_name):
+    if entry := _entries_of_system(system_name).get(effect_name):
         return _effect_of_entry(entry)
     try:
         file = import_module(f"{SYSTEMS[system_name].effects}.{effect_name}")
     except (ImportError, SyntaxError) as error:
-        raise InputError(
-            f"{effect_name}.py", "", None, f"is no effect of {system_name} that can be imported: {error}"
-        ) from None
+        allowed = f"is no effect of {system_name} that can be imported: {error}"
+        raise InputError(f"{effect_name}.py", "", None, allowed) from None
     needed = ("PLACE", "leave_out") if hasattr(file, "named") else ("Parameters", "extend")
     missing = [key for key in ("COST", *needed) if not hasattr(file, key)]
     if missing:
@@ -187,24 +184,24 @@ def named_effects(scene: Any) -> tuple[str, ...]:
     named = [
         name
         for name, file in _effect_files(scene.system).items()
-        if name in tables_of(scene) or _names_effect(scene, file)
+        if name in effect_tables_of(scene) or _names_effect(scene, file)
     ]
-    named += [name for name, entry in _table(scene.system).items() if entry.named(scene)]
+    named += [name for name, entry in _entries_of_system(scene.system).items() if entry.named(scene)]
     return tuple(sorted(named))
 
 
 def _names_effect(scene: Any, effect_file: Path) -> bool:
     """Whether the scene's system tables contain the key that names the effect in this file."""
-    return _is_in_own_tables(effect_file) and module_of(scene.system, effect_file.stem).named(scene)
+    return _is_in_own_tables(effect_file) and effect_of(scene.system, effect_file.stem).named(scene)
 
 
 def absent_effects(scene: Any) -> tuple[str, ...]:
     """Effects of the scene's system that the scene does not name."""
     named = named_effects(scene)
-    return tuple(name for name in names_of(scene.system) if name not in named)
+    return tuple(name for name in effect_names_of(scene.system) if name not in named)
 
 
-def tables_of(scene: Any) -> Mapping[str, Any]:
+def effect_tables_of(scene: Any) -> Mapping[str, Any]:
     """The scene's tables [effects.NAME], by effect name."""
     tables = getattr(scene, "effects", None)
     return tables if isinstance(tables, Mapping) else {}
@@ -218,7 +215,7 @@ def _is_in_own_tables(effect_file: Path) -> bool:
 
 def read_tables(effect_tables: Mapping[str, Any], system_name: str, scene_path: str) -> Table:
     """Checked parameters of all tables [effects.NAME]; InputError for an effect that is unknown or has another key."""
-    return {name: _read(name, values, system_name, scene_path) for name, values in effect_tables.items()}
+    return {name: _checked_table(name, values, system_name, scene_path) for name, values in effect_tables.items()}
 
 
 def with_effect_tables(scene: Any) -> Any:
@@ -226,49 +223,46 @@ def with_effect_tables(scene: Any) -> Any:
     other."""
     extended_scene = scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, scene.file)})
     if extended_scene.effects:
-        check(extended_scene)
+        check_effects(extended_scene)
     return extended_scene
 
 
 def extended_by_effects(system_object: Any, scene: Any) -> Any:
     """The object that a system built from a scene, extended by the effects in the tables [effects.NAME]."""
-    for name, table in tables_of(scene).items():
-        system_object = _extend(name, module_of(scene.system, name), system_object, table)
+    for name, table in effect_tables_of(scene).items():
+        system_object = _extended_by_effect(name, effect_of(scene.system, name), system_object, table)
     return system_object
 
 
-def _extend(effect_name: str, effect_module: Any, system_object: Any, effect_table: Any) -> Any:
+def _extended_by_effect(effect_name: str, effect: Any, system_object: Any, effect_table: Any) -> Any:
     """The system's object, extended by one effect; InputError if the effect's ``extend`` fails or returns nothing."""
     try:
-        result = effect_module.extend(system_object, effect_table)
+        result = effect.extend(system_object, effect_table)
     except (InputError, RunFailed):
         raise
     except Exception as error:
         lines = [
-            frame.lineno
-            for frame in traceback.extract_tb(error.__traceback__)
-            if frame.filename == effect_module.__file__
+            frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == effect.__file__
         ]
         allowed = f"line {lines[-1]} stops with {type(error).__name__}: {error}"
         raise InputError(f"{effect_name}.py", "extend", None, allowed) from error
     if result is None:
-        raise InputError(
-            f"{effect_name}.py", "extend", None, "returns nothing: it must give back what it gets, changed"
-        )
+        allowed = "returns nothing: it must give back what it gets, changed"
+        raise InputError(f"{effect_name}.py", "extend", None, allowed)
     return result
 
 
-def _read(effect_name: str, table_values: Any, system_name: str, scene_path: str) -> Any:
+def _checked_table(effect_name: str, table_values: Any, system_name: str, scene_path: str) -> Any:
     """Checked parameters of one table [effects.NAME]; raises InputError for an unknown effect."""
-    if effect_name not in names_of(system_name):
-        raise InputError(scene_path, f"effects.{effect_name}", None, "no such effect", names_of(system_name))
-    module = module_of(system_name, effect_name)
+    if effect_name not in effect_names_of(system_name):
+        raise InputError(scene_path, f"effects.{effect_name}", None, "no such effect", effect_names_of(system_name))
+    module = effect_of(system_name, effect_name)
     if not hasattr(module, "Parameters"):
         raise InputError(scene_path, f"effects.{effect_name}", None, f"has another place in a scene: {module.PLACE}")
     return read(module.Parameters, table_values, scene_path, f"effects.{effect_name}")
 
 
-def check(scene: Any) -> None:
+def check_effects(scene: Any) -> None:
     """Raise InputError, with the remedy, if a scene's effects exclude each other or lack an effect that they need."""
     check_combination(named_effects(scene), scene)
 
@@ -277,7 +271,7 @@ def check_combination(present_effects: Iterable[str], scene: Any) -> None:
     """Raise InputError if these effects (names) of a scene exclude each other or lack one that they need."""
     present_effects = tuple(present_effects)
     for name in present_effects:
-        module = module_of(scene.system, name)
+        module = effect_of(scene.system, name)
         why = f", {module.WHY}" if module.WHY else ""
         for other_effect in module.NEEDS:
             if other_effect not in present_effects:
@@ -286,7 +280,7 @@ def check_combination(present_effects: Iterable[str], scene: Any) -> None:
                     _key_of_effect(module, name),
                     None,
                     f"needs the effect {other_effect!r}{why}: name it too"
-                    f"{_what_to_drop(scene, other_effect, present_effects)}{_table_of_effect(scene, other_effect)}",
+                    f"{_drop_phrase(scene, other_effect, present_effects)}{_table_of_effect(scene, other_effect)}",
                 )
         for other_effect in module.EXCLUDES:
             if other_effect in present_effects:
@@ -299,13 +293,9 @@ def check_combination(present_effects: Iterable[str], scene: Any) -> None:
                 )
 
 
-def _what_to_drop(scene: Any, effect_name: str, present_effects: tuple[str, ...]) -> str:
+def _drop_phrase(scene: Any, effect_name: str, present_effects: tuple[str, ...]) -> str:
     """Phrase that names the effects that cannot stand beside the effect ``effect_name``; empty if there are none."""
-    clash = [
-        other_effect
-        for other_effect in module_of(scene.system, effect_name).EXCLUDES
-        if other_effect in present_effects
-    ]
+    clash = [other for other in effect_of(scene.system, effect_name).EXCLUDES if other in present_effects]
     return f" in place of {' and '.join(map(repr, clash))}, beside which it cannot stand" if clash else ""
 
 
@@ -316,7 +306,7 @@ def _key_of_effect(effect_module: Any, effect_name: str) -> str:
 
 def _table_of_effect(scene: Any, effect_name: str) -> str:
     """Phrase on the scene key that names an effect, if this is not the effect's own name; else empty."""
-    key = _key_of_effect(module_of(scene.system, effect_name), effect_name).removeprefix("effects.")
+    key = _key_of_effect(effect_of(scene.system, effect_name), effect_name).removeprefix("effects.")
     return "" if key == effect_name else f"; {effect_name!r} is named by {key}"
 
 
@@ -326,25 +316,24 @@ def table_without_defaults(scene: Any) -> Table:
     return {key: value for key, value in table.items() if key not in ("file", "folder")}
 
 
-def scene_without(scene: Any, *left_out_effects: str) -> Any:
+def scene_without(scene: Any, *left_out: str) -> Any:
     """The scene without the given effects; InputError if an effect cannot be left out or another one needs it."""
     table = table_without_defaults(scene)
-    for name in sorted(left_out_effects, key=lambda name: _dependency_depth(name, scene.system), reverse=True):
-        if name in tables_of(scene):
+    for name in sorted(left_out, key=lambda name: _dependency_depth(name, scene.system), reverse=True):
+        if name in effect_tables_of(scene):
             del table["effects"][name]
         else:
-            module_of(scene.system, name).leave_out(table, scene)
-    smaller = _confirmed_scene(rebuilt_scene(table, scene), left_out_effects, False)
-    needy = [name for name in named_effects(scene) if set(left_out_effects) & {*module_of(scene.system, name).NEEDS}]
-    gone = [name for name in needy if name not in (*left_out_effects, *named_effects(smaller))]
+            effect_of(scene.system, name).leave_out(table, scene)
+    smaller = _confirmed_scene(rebuilt_scene(table, scene), left_out, False)
+    needy = [name for name in named_effects(scene) if set(left_out) & {*effect_of(scene.system, name).NEEDS}]
+    gone = [name for name in needy if name not in (*left_out, *named_effects(smaller))]
     if gone:
         need = "it needs" if len(gone) == 1 else "they need"
         raise InputError(
             scene.file,
             "",
             None,
-            f"{' and '.join(left_out_effects)} cannot be left out alone: leave out {' and '.join(gone)}, too, "
-            f"for {need} it",
+            f"{' and '.join(left_out)} cannot be left out alone: leave out {' and '.join(gone)}, too, for {need} it",
         )
     return smaller
 
@@ -352,8 +341,7 @@ def scene_without(scene: Any, *left_out_effects: str) -> Any:
 def _dependency_depth(effect_name: str, system_name: str) -> int:
     """Length of the longest chain of needed effects from ``effect_name`` on; the longest chains are removed first."""
     return 1 + max(
-        (_dependency_depth(other_effect, system_name) for other_effect in module_of(system_name, effect_name).NEEDS),
-        default=0,
+        (_dependency_depth(other, system_name) for other in effect_of(system_name, effect_name).NEEDS), default=0
     )
 
 
@@ -362,7 +350,7 @@ def with_effects(scene: Any, *added_effects: str) -> Any:
     no part with these values."""
     table = table_without_defaults(scene)
     for name in added_effects:
-        _put_in(table, name, scene)
+        _add_effect(table, name, scene)
     return _confirmed_scene(rebuilt_scene(table, scene), added_effects, True)
 
 
@@ -375,14 +363,14 @@ def _confirmed_scene(scene: Any, effect_names: Iterable[str], must_be_named: boo
                 "cannot be in this scene: nothing of it takes part" if must_be_named else "is still there: leave it in"
             )
             raise InputError(
-                scene.file, _key_of_effect(module_of(scene.system, name), name), None, f"{name!r} {refusal}"
+                scene.file, _key_of_effect(effect_of(scene.system, name), name), None, f"{name!r} {refusal}"
             )
     return scene
 
 
-def _put_in(scene_table: Table, effect_name: str, scene: Any) -> None:
+def _add_effect(scene_table: Table, effect_name: str, scene: Any) -> None:
     """Add an effect with its usual values to the nested tables of a scene; raises InputError if it has none."""
-    module = module_of(scene.system, effect_name)
+    module = effect_of(scene.system, effect_name)
     if "file" in getattr(module, "EXAMPLE", ()):
         raise InputError(scene.file, f"effects.{effect_name}.file", None, "has no usual value: name a file of yours")
     if hasattr(module, "EXAMPLE"):
@@ -398,13 +386,13 @@ def _put_in(scene_table: Table, effect_name: str, scene: Any) -> None:
 def rebuilt_scene(scene_table: Table, scene: Any) -> Any:
     """The scene made from an edited table, after all checks."""
     changed_scene = import_module(SYSTEMS[scene.system].scene).build(scene_table, scene.file, Path(scene.folder))
-    check(changed_scene)
+    check_effects(changed_scene)
     return changed_scene
 
 
 def effect_lines(scene: Any, line_width: int = 10) -> list[str]:
     """Lines of ``twinrig show``: one per effect of the scene with its cost, and one that lists all absent effects."""
-    cost_by_effect = {name: module_of(scene.system, name).COST for name in named_effects(scene)}
+    cost_by_effect = {name: effect_of(scene.system, name).COST for name in named_effects(scene)}
     effect_lines_of_scene = [f"  {'effect':<{line_width}} {name}: {cost}" for name, cost in cost_by_effect.items()]
     return [
         *effect_lines_of_scene,

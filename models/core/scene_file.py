@@ -134,13 +134,13 @@ def existing_file(file_name: str, scene_folder: Path, scene_path: str, key_path:
 
 def changed_tables(toml_path: Path, changes: Iterable[str]) -> dict[str, Any]:
     """A TOML file as nested tables, with changes of the form KEY.KEY=VALUE applied on top."""
-    table = parse(toml_path)
+    table = parse_toml(toml_path)
     for change in changes:
         _set_nested_key(table, change)
     return table
 
 
-def parse(toml_path: Path) -> dict[str, Any]:
+def parse_toml(toml_path: Path) -> dict[str, Any]:
     """A TOML file as nested tables; raises InputError where it cannot be read."""
     try:
         return tomllib.loads(toml_path.read_bytes().decode("utf-8-sig"))

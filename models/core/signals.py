@@ -56,7 +56,7 @@ class Signal(Protocol):
 
 
 @dataclass(frozen=True)
-class Sampled:
+class SampledSignal:
     """Uniformly sampled signal, held constant over each period or linear in between.
 
     values : shape (n, channels), the first one at t = 0; period : s.
@@ -94,9 +94,9 @@ class Sampled:
         index, fractions = _sample_and_fraction(start_time, time_step, sample_count, self.period, len(self.values))
         if self.held:
             return self.values[index]
-        from models.core.piecewise import interpolate
+        from models.core.piecewise import interpolated_rows
 
-        return interpolate(self.values, index, fractions)
+        return interpolated_rows(self.values, index, fractions)
 
     def at(self, time: float) -> np.ndarray:
         """Values at one time (s), shape (channels,), identical to those of ``sample`` but faster for the single times
@@ -178,9 +178,9 @@ class Smooth:
 
     def sample(self, start_time: float, time_step: float, sample_count: int) -> np.ndarray:
         """Values and derivatives at start_time + i step, shape (sample_count, channels)."""
-        from models.core.piecewise import evaluate
+        from models.core.piecewise import piecewise_values
 
-        return evaluate(self._pieces, self.period, start_time, time_step, sample_count, self.derivatives)
+        return piecewise_values(self._pieces, self.period, start_time, time_step, sample_count, self.derivatives)
 
     def at(self, time: float) -> np.ndarray:
         """Values and derivatives at one time (s), shape (channels,)."""
@@ -191,7 +191,9 @@ class Smooth:
         return np.empty(0)
 
 
-def signal_from_samples(samples: np.ndarray, sampling_period: float, interpolation: Interpolation) -> Sampled | Smooth:
+def signal_from_samples(
+    samples: np.ndarray, sampling_period: float, interpolation: Interpolation
+) -> SampledSignal | Smooth:
     """Signal from uniform samples, shape (n, channels), with the interpolation that a scene names: held, linear or
     smooth.
 
@@ -207,11 +209,11 @@ def signal_from_samples(samples: np.ndarray, sampling_period: float, interpolati
         raise InputError("", "samples", len(samples), f"{least} or more are needed for {interpolation!r}")
     if interpolation == "smooth":
         return Smooth(samples, sampling_period)
-    return Sampled(samples, sampling_period, held=interpolation == "held")
+    return SampledSignal(samples, sampling_period, held=interpolation == "held")
 
 
 @dataclass(frozen=True)
-class Stacked:
+class StackedSignal:
     """Several signals combined into one, with their channels side by side."""
 
     parts: tuple[Signal, ...]

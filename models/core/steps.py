@@ -6,7 +6,7 @@ MOST_STEPS = 20_000_000
 """Largest number of steps of a run: its states and its input table then take about 3 GB."""
 
 
-def divides(time_step: float, time_length: float) -> bool:
+def step_divides(time_step: float, time_length: float) -> bool:
     """Whether ``time_length`` is a whole number of steps ``time_step``, 1 or more, to the rounding of decimal input."""
     ratio = time_length / time_step
     return 0.5 <= ratio < math.inf and abs(ratio - round(ratio)) <= 1e-6 * max(1.0, ratio * 1e-3)

@@ -86,10 +86,10 @@ def load(scene_path: Path, changes: Iterable[str] = (), known_systems: Mapping[s
 
     changes = list(changes)
     file = scene_path.name + (" with --set" if changes else "")
-    return of_table(changed_tables(scene_path, changes), file, scene_path.parent, known_systems)
+    return scene_of_table(changed_tables(scene_path, changes), file, scene_path.parent, known_systems)
 
 
-def of_table(
+def scene_of_table(
     scene_table: Mapping[str, Any], scene_path: str, scene_folder: Path, known_systems: Mapping[str, System] = SYSTEMS
 ) -> Any:
     """The checked scene of any system, built from nested tables. ``scene_path`` is named in messages; ``scene_folder``

@@ -78,7 +78,7 @@ def read_table(
     *,
     increasing_column: str | None = None,
     least_row_count: int = 1,
-    columns_with_gaps: bool = False,
+    allows_gaps: bool = False,
 ) -> dict[str, np.ndarray]:
     """Read a CSV table whose header names the unit of every column.
 
@@ -89,7 +89,7 @@ def read_table(
         ``{"time": SECONDS, "front": NEWTONS}``; the file has these columns and no others
     increasing_column : column whose values must rise from every row to the next one (time, arc length)
     least_row_count : smallest accepted number of rows
-    columns_with_gaps : whether a cell may be empty or ``nan``, which is then NaN; never one of the increasing column
+    allows_gaps : whether a cell may be empty or ``nan``, which is then NaN; never one of the increasing column
 
     Returns
     -------
@@ -106,7 +106,7 @@ def read_table(
         text = plain_text(table_path, text, tuple(column_units))
     header, rows = _header_and_rows(table_path, text)
     names, factors = columns_and_factors(table_path, header, column_units)
-    raw = _all_cells(table_path, text, tuple(columns_with_gaps and name != increasing_column for name in names))
+    raw = _all_cells(table_path, text, tuple(allows_gaps and name != increasing_column for name in names))
     if len(rows) < least_row_count:
         raise InputError(table_path, "rows", len(rows), f"at least {least_row_count} rows of numbers are needed")
     table = {name: raw[:, i] * factors[i] for i, name in enumerate(names)}

@@ -32,7 +32,7 @@ def read_time_series(
         {"time": SECONDS, **column_units},
         increasing_column="time",
         least_row_count=8,
-        columns_with_gaps=gaps_allowed,
+        allows_gaps=gaps_allowed,
     )
     time = table["time"]
     period = (time[-1] - time[0]) / (len(time) - 1)

@@ -5,8 +5,14 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
-from models.core.assumptions import BrokenAssumption, assumption_sentences, broken_of
-from models.core.discretisation import WARNED_SHARE, error_lines, errors_of, largest_estimate, with_stated_errors
+from models.core.assumptions import BrokenAssumption, assumption_sentences, broken_assumptions_of
+from models.core.discretisation import (
+    WARNED_SHARE,
+    error_estimates_of,
+    error_lines,
+    largest_estimate,
+    with_stated_errors,
+)
 from models.core.result import Result
 
 LISTED_RESULTS = 4
@@ -16,12 +22,12 @@ Results = Mapping[str, Result]
 """Results of one command by what distinguishes them, such as the engine."""
 
 
-def message_lines(results_by_name: Results) -> list[str]:
+def messages_on_results(results_by_name: Results) -> list[str]:
     """Printed lines on results: errors first, then broken assumptions, each listed once with the results that broke
     it."""
     return [
         *_error_lines(results_by_name),
-        *(f"  {names}: {breach.line()}" for names, breach in worst_breaches(results_by_name)),
+        *(f"  {names}: {breach.line()}" for names, breach in worst_broken_assumptions(results_by_name)),
     ]
 
 
@@ -35,13 +41,13 @@ def _error_lines(results_by_name: Results) -> list[str]:
     for name, run in results_by_name.items():
         for line in error_lines(run) if name not in worst else ():
             results_without_estimate.setdefault(line, []).append(name)
-    listed = [f"  {_list_of_few(names)}: {line}" for line, names in results_without_estimate.items()]
+    listed = [f"  {_few_names_text(names)}: {line}" for line, names in results_without_estimate.items()]
     if not worst:
         return listed
     largest = max(worst, key=lambda name: worst[name].share)
     warned = [name for name, estimate in worst.items() if estimate.warned]
     further_lines = (
-        [f"  errors above {100.0 * WARNED_SHARE:g} % in {len(warned)} of {len(worst)}: {_list_of_few(warned)}"]
+        [f"  errors above {100.0 * WARNED_SHARE:g} % in {len(warned)} of {len(worst)}: {_few_names_text(warned)}"]
         if warned[1:]
         else []
     )
@@ -49,24 +55,24 @@ def _error_lines(results_by_name: Results) -> list[str]:
     return [first, *further_lines, *listed]
 
 
-def _list_of_few(result_names: list[str]) -> str:
+def _few_names_text(result_names: list[str]) -> str:
     """The first few names, and the number of the others, as text."""
     return ", ".join(result_names[:LISTED_RESULTS]) + (
         f" and {len(result_names) - LISTED_RESULTS} more" if len(result_names) > LISTED_RESULTS else ""
     )
 
 
-def worst_breaches(results_by_name: Results) -> list[tuple[str, BrokenAssumption]]:
+def worst_broken_assumptions(results_by_name: Results) -> list[tuple[str, BrokenAssumption]]:
     """Broken assumptions with the names of the results that broke them: of each assumption the worst violation over all
     results."""
     names_by_breach: dict[str, list[str]] = {}
     worst: dict[str, BrokenAssumption] = {}
     for name, run in results_by_name.items():
-        for breach in broken_of(run):
+        for breach in broken_assumptions_of(run):
             names_by_breach.setdefault(breach.name, []).append(name)
             if breach.name not in worst or breach.share > worst[breach.name].share:
                 worst[breach.name] = breach
-    return [(_list_of_few(names_by_breach[name]), breach) for name, breach in worst.items()]
+    return [(_few_names_text(names_by_breach[name]), breach) for name, breach in worst.items()]
 
 
 def figure_remarks(results_by_name: Results) -> list[str]:
@@ -76,7 +82,7 @@ def figure_remarks(results_by_name: Results) -> list[str]:
         for name, run in results_by_name.items()
         if (worst := largest_estimate(run)) is not None and worst.warned
     ]
-    return [*steps[:LISTED_RESULTS], *(breach.brief() for _, breach in worst_breaches(results_by_name))]
+    return [*steps[:LISTED_RESULTS], *(breach.brief() for _, breach in worst_broken_assumptions(results_by_name))]
 
 
 def joined_result(joined_data: Result, results_by_name: Results) -> Result:
@@ -91,12 +97,12 @@ def joined_result(joined_data: Result, results_by_name: Results) -> Result:
     joined_data.data.attrs["error"] = json.dumps({**first, "channels": channels} if channels else first)
     assumed = dict.fromkeys(text for run in results_by_name.values() for text in assumption_sentences(run))
     worst_breach = [
-        replace(breach, where=f"{names}, {breach.where}") for names, breach in worst_breaches(results_by_name)
+        replace(breach, where=f"{names}, {breach.where}") for names, breach in worst_broken_assumptions(results_by_name)
     ]
     joined_data.data.attrs["assumptions"] = json.dumps(
         {"assumed": list(assumed), "broken": [asdict(breach) for breach in worst_breach]}
     )
-    broke = (run.data.attrs["status"] for run in results_by_name.values() if broken_of(run))
+    broke = (run.data.attrs["status"] for run in results_by_name.values() if broken_assumptions_of(run))
     joined_data.data.attrs["status"] = next(broke, joined_data.data.attrs["status"])
     return joined_data
 
@@ -110,12 +116,12 @@ def derived_result(derived_data: Result, results_by_name: Results, method_text: 
     assumed = [says for run in results_by_name.values() for says in assumption_sentences(run)]
     assumptions = {
         "assumed": list(dict.fromkeys(assumed)),
-        "broken": [asdict(breach) for _, breach in worst_breaches(results_by_name)],
+        "broken": [asdict(breach) for _, breach in worst_broken_assumptions(results_by_name)],
     }
     derived_data.data.attrs["assumptions"] = json.dumps(assumptions)
     if assumptions["broken"] and "assumptions broken" not in derived_data.data.attrs["status"]:
         derived_data.data.attrs["status"] += ", assumptions broken"
-    pairs = [pair for run in results_by_name.values() for pair in errors_of(run).items()]
+    pairs = [pair for run in results_by_name.values() for pair in error_estimates_of(run).items()]
     worst = dict(sorted(pairs, key=lambda pair: pair[1].share))
     return with_stated_errors(derived_data, worst, method_text) if worst else derived_data
 
@@ -137,7 +143,7 @@ def summary_with_errors(study_summary: dict[str, Any]) -> dict[str, Any]:
     return (
         study_summary
         | errors_and_assumptions(results)
-        | {"table": [*study_summary.get("table", []), *message_lines(results)]}
+        | {"table": [*study_summary.get("table", []), *messages_on_results(results)]}
     )
 
 

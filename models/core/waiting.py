@@ -8,7 +8,7 @@ PROGRESS_FUNCTIONS: list[Callable[[], float]] = []
 
 
 @contextmanager
-def simulation_progress(completed_share: Callable[[], float]) -> Iterator[None]:
+def report_simulation_progress(completed_share: Callable[[], float]) -> Iterator[None]:
     """Context of a running simulation; ``completed_share`` is a function that returns the completed share, 0 to 1.
     Another thread may call it at any time."""
     PROGRESS_FUNCTIONS.append(completed_share)

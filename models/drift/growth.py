@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.core.errors import InputError
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 FAST_PITCH_FREQUENCY = 0.2
 """Frequency (Hz) above which a pitch rate counts as fast: 1.3 rad/s, three times the largest growth rate of the study
@@ -74,7 +74,7 @@ class RigidPitch:
         return pitch_rates**2 * self.inertia / self.total_inertia
 
 
-def rigid_pitch(parameters: Parameters) -> RigidPitch:
+def rigid_pitch(parameters: PitchPlaneParameters) -> RigidPitch:
     """``RigidPitch`` of a pitch-plane parameter set."""
     mass, coupling = (
         parameters.m1 + parameters.m2 + parameters.m3,
@@ -99,7 +99,9 @@ def high_passed(signal: np.ndarray, sample_period: float, cutoff: float = FAST_P
     return np.fft.irfft(np.fft.rfft(longer) * power / (1.0 + power), len(longer))[beyond : beyond + len(signal)]
 
 
-def pitch_rate_of_forces(wheel_forces: np.ndarray, sample_period: float, parameters: Parameters) -> np.ndarray:
+def pitch_rate_of_forces(
+    wheel_forces: np.ndarray, sample_period: float, parameters: PitchPlaneParameters
+) -> np.ndarray:
     """Pitch rate (n,) in rad/s from wheel forces (n, 2) in N alone: their moment is integrated once, without a
     simulation."""
     rigid = rigid_pitch(parameters)
@@ -109,7 +111,10 @@ def pitch_rate_of_forces(wheel_forces: np.ndarray, sample_period: float, paramet
 
 
 def growth_rate(
-    pitch_rate: np.ndarray, sample_period: float, vehicle_parameters: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
+    pitch_rate: np.ndarray,
+    sample_period: float,
+    vehicle_parameters: PitchPlaneParameters,
+    cutoff: float = FAST_PITCH_FREQUENCY,
 ) -> float:
     """Growth rate lambda (1/s) of a pitch error from the pitch rate (n,) in rad/s of a run or of
     ``pitch_rate_of_forces``; the wheel forces are vertical in space."""
@@ -121,7 +126,7 @@ def growth_rate(
 
 
 def sinh_law_rate(
-    pitch_rate: np.ndarray, sample_period: float, parameters: Parameters, cutoff: float = FAST_PITCH_FREQUENCY
+    pitch_rate: np.ndarray, sample_period: float, parameters: PitchPlaneParameters, cutoff: float = FAST_PITCH_FREQUENCY
 ) -> np.ndarray:
     """Growth rate lambda (n,) in 1/s with which the sinh law of ``pitch_variance`` holds at each time, if the motion
     changes along the run.
@@ -168,7 +173,7 @@ def pitch_variance(
 
 
 def heave_variance(
-    times: np.ndarray | float, parameters: Parameters, force_deviation: float, sample_period: float
+    times: np.ndarray | float, parameters: PitchPlaneParameters, force_deviation: float, sample_period: float
 ) -> np.ndarray:
     """Variance (m^2) of the heave of the common centre of mass after times t (s): 2 s^2 D / M^2 t^3 / 3, with standard
     deviation s (N) and period D (s) of the wheel forces' samples, and total mass M. A heave error does not grow by
@@ -177,13 +182,13 @@ def heave_variance(
     return 2 * force_deviation**2 * sample_period / mass**2 * np.asarray(times, dtype=float) ** 3 / 3
 
 
-def holding_stiffness(parameters: Parameters, error_growth_rate: float) -> float:
+def holding_stiffness(parameters: PitchPlaneParameters, error_growth_rate: float) -> float:
     """Smallest rotational stiffness to the ground (N m/rad) that keeps the pitch from growing: total pitch inertia
     times the squared growth rate (1/s)."""
     return rigid_pitch(parameters).total_inertia * error_growth_rate**2
 
 
-def pitch_spring(parameters: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
+def pitch_spring(parameters: PitchPlaneParameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
     """Stiffness k = (I + J) wc^2 (N m/rad) and damping d = 2 zeta (I + J) wc (N m s/rad) of a pitch spring to the
     ground with a natural ``frequency`` (Hz)."""
     corner, inertia = 2 * math.pi * frequency, rigid_pitch(parameters).total_inertia

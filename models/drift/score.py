@@ -18,7 +18,7 @@ from models.core.errors import InputError
 from models.core.result import Result
 from models.core.strict import Strict
 from models.fatigue.damage import WOEHLER_SLOPE, damage_ratio
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 JUDGED_BAND = 15.0
 """Upper edge (Hz) of the frequency band in which the artificial moment is judged: what bends a chassis."""
@@ -114,7 +114,7 @@ class StabilisedRunVerdict:
     reason: str
 
 
-def figures_of_run(run: Result, vehicle_parameters: Parameters) -> RunFigures:
+def figures_of_run(run: Result, vehicle_parameters: PitchPlaneParameters) -> RunFigures:
     """Figures of a run that need no true run, such as its artificial moment; raises InputError unless its rows are on a
     uniform, fine grid.
 
@@ -321,7 +321,7 @@ def _step_means(samples: np.ndarray, sampling_period: float) -> np.ndarray:
     return (samples[1:] + samples[:-1]) / 2.0 - sampling_period / 12.0 * np.diff(slope)
 
 
-def _natural_moment(run: Result, parameters: Parameters) -> np.ndarray:
+def _natural_moment(run: Result, parameters: PitchPlaneParameters) -> np.ndarray:
     """Pitch moment (n,) in N m on the chassis from suspension forces and body-fixed wheel forces, without the
     stabiliser."""
     moment = run["suspension_moment"]

@@ -9,7 +9,7 @@ import numpy as np
 from models.core.assumptions import Assumption
 from models.core.signals import Signal
 from models.vehicles import pitch_plane
-from models.vehicles.description import PitchSpring, Vehicle
+from models.vehicles.description import PitchSpring, PlaneVehicle
 
 Mode = Literal["free", "road", "force", "force-body", "pitch", "heave-pitch"]
 PRESCRIBED_COORDINATES: dict[str, tuple[int, ...]] = {"pitch": (3,), "heave-pitch": (2, 3)}
@@ -39,8 +39,8 @@ class Assembly:
     """
 
     scene: Any
-    vehicle: Vehicle
-    parameters: pitch_plane.Parameters
+    vehicle: PlaneVehicle
+    parameters: pitch_plane.PitchPlaneParameters
     mode: Mode
     input: Signal | None
     initial: np.ndarray

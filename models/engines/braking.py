@@ -40,7 +40,7 @@ class WheelForces(NamedTuple):
 
 
 @lean
-def held(parameter_table, time, q, v, generalised_forces):
+def add_constant_wheel_forces(parameter_table, time, q, v, generalised_forces):
     """Add the wheel forces, constant in the wheels' own axes, to the generalised forces ``generalised_forces``. All
     arguments but the time are pointers to doubles."""
     head = array(parameter_table, (HEADER,))
@@ -69,15 +69,17 @@ def held(parameter_table, time, q, v, generalised_forces):
 
 
 @lean
-def set_held(block_address, t, coordinate_count):
+def set_constant_wheel_forces(block_address, t, coordinate_count):
     """Compute the generalised wheel forces for a state, in a block of doubles at an address: forces f (n,), which are
     set to zero first, q and v (n,), and the table."""
     f = at(block_address)
     array(f, (coordinate_count,))[:] = 0.0
-    held(beyond(f, 3 * coordinate_count), t, beyond(f, coordinate_count), beyond(f, 2 * coordinate_count), f)
+    add_constant_wheel_forces(
+        beyond(f, 3 * coordinate_count), t, beyond(f, coordinate_count), beyond(f, 2 * coordinate_count), f
+    )
 
 
-def bodies(plane_vehicle: PlaneVehicle) -> SpatialVehicle:
+def bodies_of_plane_vehicle(plane_vehicle: PlaneVehicle) -> SpatialVehicle:
     """The units of a plane vehicle (tractor, trailers) as bodies of an engine. Each unit after the first turns about
     its hinge.
 
@@ -104,7 +106,13 @@ class EngineChassis:
         units, none = plane_vehicle.masses.size, np.zeros((3, plane_vehicle.wheels))
         wheels = np.vstack((plane_vehicle.unit, plane_vehicle.place.T, none))
         numbers = np.concatenate(([units, plane_vehicle.wheels], plane_vehicle.arm_lengths.ravel(), wheels.ravel()))
-        driven = Driven(bodies(plane_vehicle), np.zeros(3), numbers, held, set_held)
+        driven = LoadedVehicle(
+            bodies_of_plane_vehicle(plane_vehicle),
+            np.zeros(3),
+            numbers,
+            add_constant_wheel_forces,
+            set_constant_wheel_forces,
+        )
         self._model: FreeModel = free_model(engine, driven)
         self._held = WheelForces(*self._model.numbers[HEADER + units * units :].reshape(HELD, plane_vehicle.wheels))
 

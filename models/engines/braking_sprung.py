@@ -36,22 +36,22 @@ from models.brake.sprung_step import (
 from models.brake.surfaces import VehicleOnRoad, fill_surfaces_under_wheels, new_wheel_surfaces
 from models.core.errors import RunFailed
 from models.engines.assembly import Settings
-from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.free_vehicle import FreeModel, LoadedVehicle, free_model
 from models.engines.native_parts import joint_parts
 from models.engines.spatial_protocol import INTEGRATORS, check_modes
 from models.engines.stability import LONG_RUN
 from models.engines.towed_springs import shared_numbers, towed_division
-from models.vehicles.spatial_linear import linearise, mass
+from models.vehicles.spatial_linear import design_mass_matrix, linearise
 
 if TYPE_CHECKING:
     from models.brake.relaxation import TyreLag
     from models.brake.sprung_relaxation import ContactLag
 
-BLINK = 1e-5
+SHORT_TIME = 1e-5
 """Duration (s) of the short step from which the accelerations of a freely rolling vehicle are computed."""
 
 
-def driven_vehicle(sprung_vehicle: SprungVehicle, engine: str) -> Driven:
+def driven_vehicle(sprung_vehicle: SprungVehicle, engine: str) -> LoadedVehicle:
     """The free vehicle for "exudyn" or "mujoco": springs that the engine itself computes, and the table of all other
     forces."""
     handling = sprung_vehicle.handling
@@ -59,7 +59,7 @@ def driven_vehicle(sprung_vehicle: SprungVehicle, engine: str) -> Driven:
     wheels = np.zeros(VALUES_PER_WHEEL * len(handling.vehicle.tyres))
     table = np.concatenate((shared_numbers(handling, division), wheels))
     native = (*joint_parts(handling.vehicle), *division.native)
-    return Driven(handling.vehicle, handling.gravity, table, forces_from_pointers, set_forces_from_block, native)
+    return LoadedVehicle(handling.vehicle, handling.gravity, table, forces_from_pointers, set_forces_from_block, native)
 
 
 class EngineSprungVehicle:
@@ -90,7 +90,7 @@ class EngineSprungVehicle:
             forces_and_contacts(self._driven.numbers, np.zeros(size), rate, np.zeros(size), contacts)
             across[:, j] = contacts.across
         loads = np.array([handling.held.tyres[tyre.name] for tyre in handling.vehicle.tyres])
-        damping = np.linalg.solve(mass(handling.vehicle), across.T @ (loads[:, None] * across))
+        damping = np.linalg.solve(design_mass_matrix(handling.vehicle), across.T @ (loads[:, None] * across))
         return float(np.linalg.eigvals(damping).real.max())
 
     @cached_property
@@ -104,7 +104,7 @@ class EngineSprungVehicle:
         if self._model.compiled() is not None:
             from models.engines import braking_sprung_mujoco as native
 
-            return native.lagging() if has_lag else (native.advance, native.by_steps)
+            return native.lagging() if has_lag else (native.advance, native.samples_by_steps)
         if not has_lag:
             return advance, samples_with_step(advance)
         from models.brake.sprung_relaxation import advance_contact_lag
@@ -227,7 +227,7 @@ class EngineSprungVehicle:
         fill_surfaces_under_wheels(on_engine.units.motion, 0.0, _without_unit_count(vehicle), known.surfaces)
         known.wheels.start[:] = on_engine.contacts.along
         set_slip_angles(on_engine.contacts, 0.0, known.surfaces.lag, vehicle.tables.angles, known.wheels)
-        store_mean_forces(known, none, none, BLINK, motion_of(state, turning), _without_unit_count(vehicle))
+        store_mean_forces(known, none, none, SHORT_TIME, motion_of(state, turning), _without_unit_count(vehicle))
         return self._model.acceleration(0.0, *state), turning
 
 

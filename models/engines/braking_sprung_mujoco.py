@@ -9,7 +9,7 @@ from models.brake.sprung_step import compiled
 from models.engines.mujoco_native import accelerate, march
 
 advance = compiled("in_mujoco", accelerate=accelerate, march=march)
-by_steps = samples.compiled_samples(advance, "by_steps_in_mujoco")
+samples_by_steps = samples.compiled_samples(advance, "by_steps_in_mujoco")
 
 
 @cache

@@ -15,7 +15,8 @@ Speed
 Steps
     Creep forces damp like G a b C / V by mass: 10^4 1/s at 1 m/s, 10^5 1/s at 0.1 m/s and below. Explicit methods need
     steps shorter than about 2 by that, and a longer one is refused before the run, as friction keeps its nonsense
-    small. Implicit ones take steps of the suspension's own motions, with ``slopes`` for their Newton's method.
+    small. Implicit ones take steps of the suspension's own motions, with ``force_slopes_by_differences`` for their
+    Newton's method.
 """
 
 from dataclasses import dataclass, field, replace
@@ -42,7 +43,7 @@ from models.contact.undeformed_distance import UndeformedDistance, quadratic
 from models.core.errors import InputError, Refused
 from models.engines.stability import ALLOWED_GROWTH, LONG_RUN, LinearMatrices, log_growth, longest_stable_step
 from models.machine.compiled import njit
-from models.machine.records import record, records, size_of
+from models.machine.records import record, records_at_pointer, size_of
 from models.machine.stack import array, at, beyond, doubles, start
 from models.rail.wheel_forces import REGULARISED_SPEED
 
@@ -64,7 +65,7 @@ OF_POSITION, OF_RATE = np.array([1e-8, 1e-8, 1e-8, 1e-6]), np.array([1e-5, 1e-5,
 
 
 @dataclass(frozen=True)
-class Wheels:
+class RailWheels:
     """Rail wheels that roll side by side. Springs and dampers connect each to a frame that moves along the track at
     ``speed`` (m/s).
 
@@ -159,15 +160,15 @@ def forces(parameter_table, t, q, v, generalised_forces):
 
     Not a number where a contact is none that the kernel can answer: the engines stop at that, and say so.
     """
-    head = records(parameter_table, 1, HEAD)[0]
+    head = records_at_pointer(parameter_table, 1, HEAD)[0]
     wheels = int(head.wheels)
     places, rates, sums = (
-        records(q, wheels, FREEDOM),
-        records(v, wheels, FREEDOM),
-        records(generalised_forces, wheels, FREEDOM),
+        records_at_pointer(q, wheels, FREEDOM),
+        records_at_pointer(v, wheels, FREEDOM),
+        records_at_pointer(generalised_forces, wheels, FREEDOM),
     )
     inputs, outputs = doubles(INPUT_COUNT), doubles(OUTPUT_COUNT)
-    given, answer = records(inputs, 1, INPUT_RECORD)[0], records(outputs, 1, OUTPUT_RECORD)[0]
+    given, answer = records_at_pointer(inputs, 1, INPUT_RECORD)[0], records_at_pointer(outputs, 1, OUTPUT_RECORD)[0]
     given.shape_x, given.shape_y, given.mu = head.curved_x, head.curved_y, head.mu
     given.G, given.nu = head.G, head.nu
     speed = max(abs(head.speed), REGULARISED_SPEED)
@@ -209,7 +210,7 @@ def set_forces(block_address, t, coordinate_count):
 
 
 @njit(cache=True, error_model="numpy")
-def slopes(parameter_table, q, v, position_factor, rate_factor, force_slopes):
+def force_slopes_by_differences(parameter_table, q, v, position_factor, rate_factor, force_slopes):
     """Fill ``force_slopes`` (size, size) with derivatives of the forces F on all wheels, by_q dF/dq + by_v dF/dv, by
     central differences, for implicit integrators.
 
@@ -233,20 +234,20 @@ def slopes(parameter_table, q, v, position_factor, rate_factor, force_slopes):
                 force_slopes[row, row - row % FREEDOMS + i] += by * (high[row] - low[row]) / (2.0 * step)
 
 
-def linearised_wheels(wheels: Wheels) -> LinearMatrices:
+def linearised_wheels(wheels: RailWheels) -> LinearMatrices:
     """Matrices of the wheels linearised about rest, by the linear theory, whose forces rise most steeply with creepage;
     see ``stability``."""
     n, zeros = wheels.size, np.zeros(wheels.size)
     by_place, by_rate = np.zeros((n, n)), np.zeros((n, n))
     if wheels.theory != "none":
         numbers = wheels.sticking
-        slopes(numbers, zeros, zeros, 1.0, 0.0, by_place)
-        slopes(numbers, zeros, zeros, 0.0, 1.0, by_rate)
+        force_slopes_by_differences(numbers, zeros, zeros, 1.0, 0.0, by_place)
+        force_slopes_by_differences(numbers, zeros, zeros, 0.0, 1.0, by_rate)
     stiffness, damping = (np.diag(np.tile(values, wheels.count)) for values in (wheels.stiffness, wheels.damping))
     return np.diag(wheels.masses), damping - by_rate, stiffness - by_place, damping, damping
 
 
-def check_step(engine: str, wheels: Wheels, method_name: str, time_step: float, step_count: int = LONG_RUN) -> None:
+def check_step(engine: str, wheels: RailWheels, method_name: str, time_step: float, step_count: int = LONG_RUN) -> None:
     """Raise Refused for a step (s) with which a motion of the wheels would grow over the run; the message gives the
     longest stable step.
 

@@ -14,7 +14,7 @@ import numpy as np
 from models.contact.inputs import Array
 from models.core.errors import RunFailed
 from models.engines.assembly import Settings
-from models.engines.contact_bridge import FREEDOMS, Wheels, check_step, set_forces, slopes
+from models.engines.contact_bridge import FREEDOMS, RailWheels, check_step, force_slopes_by_differences, set_forces
 from models.engines.exudyn_system import add_node, items, packed_forces, quiet_settings, set_start, solve
 
 Law = Callable[[Array, Array, Array, Array], Any]
@@ -39,7 +39,7 @@ def list_forces(
     return lambda positions, rates: packed(None, 0.0, 0, positions, rates)
 
 
-class Forces:
+class WheelForceFunctions:
     """Creep forces as functions of lists of positions and rates, by the compiled kernel or by a Python ``law``.
 
     ``of`` gives the forces, ``slopes`` the sum of their derivatives to positions and rates, each times a factor: those
@@ -47,7 +47,7 @@ class Forces:
     method leaps from slip to slip at low speed and never settles; with the steepest it creeps up on the solution.
     """
 
-    def __init__(self, wheels: Wheels, python_law: Law | None = None) -> None:
+    def __init__(self, wheels: RailWheels, python_law: Law | None = None) -> None:
         size, numbers, sticking = wheels.size, wheels.numbers, wheels.sticking
         jacobian = np.zeros((size, size))
 
@@ -57,14 +57,16 @@ class Forces:
             return forces.tolist()
 
         def steepest_jacobian(positions: Any, rates: Any, position_factor: float, rate_factor: float) -> Array:
-            slopes(sticking, np.array(positions), np.array(rates), position_factor, rate_factor, jacobian)
+            force_slopes_by_differences(
+                sticking, np.array(positions), np.array(rates), position_factor, rate_factor, jacobian
+            )
             return jacobian
 
         self.of = by_law if python_law is not None else list_forces(size, numbers, set_forces)
         self.slopes = steepest_jacobian
 
 
-class Rolling:
+class RailWheelSystem:
     """Rail wheels on springs in one Exudyn system.
 
     force_function : forces of positions and rates, None for no contact; route : one of ROUTES; slopes : as those of
@@ -74,7 +76,7 @@ class Rolling:
 
     def __init__(
         self,
-        wheels: Wheels,
+        wheels: RailWheels,
         force_function: ListForces | None,
         force_route: str = ROUTES[0],
         force_slopes: Callable[[Any, Any, float, float], Array] | None = None,

@@ -8,14 +8,14 @@ import mujoco
 from numba import cfunc, types
 
 from models.contact.inputs import Array
-from models.engines.contact_bridge import Wheels, check_step
+from models.engines.contact_bridge import RailWheels, check_step
 from models.engines.mujoco_layout import check_offsets
 
 SLIDE, HINGE = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
 JOINTS = ((SLIDE, (1.0, 0.0, 0.0)), (SLIDE, (0.0, 1.0, 0.0)), (SLIDE, (0.0, 0.0, 1.0)), (HINGE, (0.0, 0.0, 1.0)))
 
 
-def model(wheels: Wheels, time_step: float = 1e-4, integrator: str = "Euler") -> mujoco.MjModel:
+def rail_wheel_model(wheels: RailWheels, time_step: float = 1e-4, integrator: str = "Euler") -> mujoco.MjModel:
     """MuJoCo model of rail wheels on springs. The callback's numbers are stored in the model, so that one callback
     serves all models of the process.
 

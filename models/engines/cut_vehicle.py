@@ -15,9 +15,9 @@ from models.core.errors import Refused, RunFailed
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.catalogue import ADAPTIVE
-from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model, native_elements_and_joints
-from models.engines.native_parts import Division, divide
-from models.engines.protocol import guard
+from models.engines.free_vehicle import FreeModel, LoadedVehicle, PlainModel, free_model, native_elements_and_joints
+from models.engines.native_parts import ElementDivision, divide_between_engine_and_callback
+from models.engines.protocol import check_trajectory
 from models.engines.spatial_protocol import check_divides, check_modes
 from models.multibody.cut_kernel import (
     ANY_TIME,
@@ -25,11 +25,11 @@ from models.multibody.cut_kernel import (
     accelerate,
     joint_forces,
     march,
-    report,
+    report_forces,
     set_joint_forces,
     table_views,
 )
-from models.multibody.cut_table import HubInputs, table
+from models.multibody.cut_table import HubInputs, cut_vehicle_table
 from models.vehicles.cut_vehicle import PITCH, CutVehicle
 from models.vehicles.spatial_linear import linearise
 
@@ -62,12 +62,12 @@ class HubRun(Trajectory):
     moments: np.ndarray
 
 
-class WrittenEquations(FreeModel):
+class HandWrittenEquations(FreeModel):
     """Hand-written equations of motion of a vehicle, without an engine."""
 
     ENGINE = "reference"
 
-    def __init__(self, loaded_vehicle: Driven) -> None:
+    def __init__(self, loaded_vehicle: LoadedVehicle) -> None:
         self.driven, self.size, self.settings = loaded_vehicle, loaded_vehicle.size, None
 
     def plan(self) -> dict[str, int]:
@@ -116,30 +116,32 @@ class HubModel:
         self.adaptive = run_settings.integrator != FIXED_STEP_METHOD
         _check_inputs(engine, vehicle, hub_inputs, 2 * self.steps + 1)
         _check_settings(engine, vehicle, run_settings)
-        self.numbers = table(vehicle, hub_inputs, step)
+        self.numbers = cut_vehicle_table(vehicle, hub_inputs, step)
         weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
         self.plain = _plain_hubs(vehicle, hub_inputs, step, self.adaptive) if engine == PLAIN_ENGINE else None
-        division, numbers = Division((), vehicle.elements), self.numbers
+        division, numbers = ElementDivision((), vehicle.elements), self.numbers
         if force_route == "native" and engine not in (PLAIN_ENGINE, "reference"):
             if hub_inputs.guide is not None and hub_inputs.pull is None:
                 raise Refused(engine, 'an enforced tilt needs every force in one place: use forces = "compiled"')
-            division = divide(vehicle.tree, vehicle.elements, engine)
-            numbers = table(replace(vehicle, elements=division.shared), hub_inputs, step)
+            division = divide_between_engine_and_callback(vehicle.tree, vehicle.elements, engine)
+            numbers = cut_vehicle_table(replace(vehicle, elements=division.shared), hub_inputs, step)
         self.division = division
         if hub_inputs.constant_in_step or self.adaptive:
             numbers = numbers.copy()  # forces are reported by the whole table, read at its rows
         self.model = self._in_engine(
-            Driven(vehicle.tree, weight, numbers, joint_forces, set_joint_forces, division.native)
+            LoadedVehicle(vehicle.tree, weight, numbers, joint_forces, set_joint_forces, division.native)
         )
         if self.adaptive and not self.plain:
             self.model.numbers[ANY_TIME] = 1.0
 
-    def _in_engine(self, loaded_vehicle: Driven) -> FreeModel:
+    def _in_engine(self, loaded_vehicle: LoadedVehicle) -> FreeModel:
         """The free vehicle in the engine, as written equations, or in plain code."""
         if self.plain:
-            return Plain(self.engine, self.plain.acceleration, self.size)
+            return PlainModel(self.engine, self.plain.acceleration, self.size)
         return (
-            WrittenEquations(loaded_vehicle) if self.engine == "reference" else free_model(self.engine, loaded_vehicle)
+            HandWrittenEquations(loaded_vehicle)
+            if self.engine == "reference"
+            else free_model(self.engine, loaded_vehicle)
         )
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -197,7 +199,7 @@ class HubModel:
         rest = np.zeros(self.size)
         path = self.marched(rest if q is None else q, rest if v is None else v)
         times, states = path.times, path.states
-        guard(self.engine, times, states, self.steps * self.step)
+        check_trajectory(self.engine, times, states, self.steps * self.step)
         tumbled = np.abs(states[:, PITCH]) > TUMBLED_PITCH
         if tumbled.any():
             at = int(np.argmax(tumbled))
@@ -225,7 +227,7 @@ def run_with_forces(vehicle: CutVehicle, parameter_table: np.ndarray, times: np.
     rows = len(times)
     inside, moments = np.empty((rows, len(vehicle.elements))), np.empty((rows, 2))
     wrenches = np.empty((rows, len(vehicle.hubs), WRENCH))
-    report(parameter_table, times, np.ascontiguousarray(states), inside, wrenches, moments)
+    report_forces(parameter_table, times, np.ascontiguousarray(states), inside, wrenches, moments)
     return HubRun(times, states, elements=inside, wrenches=wrenches, moments=moments)
 
 
@@ -262,8 +264,8 @@ class NativeShare:
 def native_share(engine: str, vehicle: CutVehicle) -> NativeShare:
     """Elements of a vehicle that "exudyn" or "mujoco" computes natively, counted in a model that is built without a
     callback."""
-    division = divide(vehicle.tree, vehicle.elements, engine)
-    driven = Driven(vehicle.tree, np.zeros(3), np.zeros(1), None, None, division.native)
+    division = divide_between_engine_and_callback(vehicle.tree, vehicle.elements, engine)
+    driven = LoadedVehicle(vehicle.tree, np.zeros(3), np.zeros(1), None, None, division.native)
     elements, joints = native_elements_and_joints(engine, driven)
     return NativeShare(elements, joints, division.reasons)
 

@@ -12,14 +12,14 @@ NO_ESTIMATE = "its steps are kept to a tolerance; for an error leave engines.NAM
 """Reason why a run with an adaptive integrator states no error: the error of its input would be missing."""
 
 
-class Adaptive(Strict):
+class AdaptiveEngineTable(Strict):
     """[engines.NAME]: in place of Runge-Kutta 4 an integrator of this engine that chooses its own steps."""
 
     integrator: str = Field(description="DOPRI5 or ODE23 of exudyn; DOP853, Radau or LSODA of the reference")
     tolerance: float = Field(default=1e-8, ge=1e-13, le=1e-3, description="of every step, relative; absolute: 1/100")
 
 
-def check_engines(scene_path: str, engine_tables: Mapping[str, Adaptive]) -> None:
+def check_engines(scene_path: str, engine_tables: Mapping[str, AdaptiveEngineTable]) -> None:
     """Raise InputError for an engine, or an integrator of an engine, that cannot choose its own steps."""
     for engine, adaptive in engine_tables.items():
         if engine not in ADAPTIVE:
@@ -30,7 +30,7 @@ def check_engines(scene_path: str, engine_tables: Mapping[str, Adaptive]) -> Non
             raise InputError(scene_path, f"engines.{engine}.integrator", adaptive.integrator, allowed, ADAPTIVE[engine])
 
 
-def plan_lines(engine_tables: Mapping[str, Adaptive], row_spacing: float) -> list[tuple[str, str]]:
+def plan_lines(engine_tables: Mapping[str, AdaptiveEngineTable], row_spacing: float) -> list[tuple[str, str]]:
     """Lines of a plan, heading and text, on the integrators that replace Runge-Kutta 4, with rows every ``row_spacing``
     (s)."""
     return [

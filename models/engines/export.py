@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from models.engines.free_vehicle import Driven
+from models.engines.free_vehicle import LoadedVehicle
 from models.vehicles.spatial import SpatialVehicle
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ LIGHTEST_SHOWN_BODY = 1e-6
 
 
 @dataclass(frozen=True)
-class Exported:
+class ExportedModel:
     """An exported model. text : of the file; has : texts with counts of what the file holds; left_out : texts on what
     the file does not hold."""
 
@@ -60,12 +60,12 @@ def exported_mujoco_model(
     names_in_file: Mapping[str, str],
     export_subject: ExportSubject,
     omissions: Sequence[str],
-) -> Exported:
+) -> ExportedModel:
     """Exported MuJoCo model that was compiled from a specification; names_in_file : see ``mujoco_export.mjcf``."""
     from models.engines.mujoco_export import item_counts, mjcf
 
     has, missing = tuple(item_counts(mujoco_model)), tuple(omissions)
-    return Exported(
+    return ExportedModel(
         mjcf(mujoco_spec, mujoco_model, names_in_file, export_subject.title, export_subject.comment(has, missing)),
         has,
         missing,
@@ -74,18 +74,18 @@ def exported_mujoco_model(
 
 def exported_exudyn_system(
     mbs: Any, coordinate_indices: dict[str, int], export_subject: ExportSubject, omissions: Sequence[str]
-) -> Exported:
+) -> ExportedModel:
     """Exported assembled Exudyn system; coordinate_indices : indices of the coordinates in Exudyn's vectors, by
     name."""
     from models.engines.exudyn_export import item_counts, python_script
 
     has, missing = tuple(item_counts(mbs)), tuple(omissions)
-    return Exported(python_script(mbs, coordinate_indices, export_subject.comment(has, missing)), has, missing)
+    return ExportedModel(python_script(mbs, coordinate_indices, export_subject.comment(has, missing)), has, missing)
 
 
 def export_free_vehicle(
-    engine: str, loaded_vehicle: Driven, export_subject: ExportSubject, omissions: Sequence[str]
-) -> Exported:
+    engine: str, loaded_vehicle: LoadedVehicle, export_subject: ExportSubject, omissions: Sequence[str]
+) -> ExportedModel:
     """Exported free vehicle in "exudyn" or "mujoco", without the forces of the compiled kernel."""
     if engine == "exudyn":
         from models.engines.free_vehicle_exudyn import FreeExudyn
@@ -94,9 +94,9 @@ def export_free_vehicle(
         return exported_exudyn_system(FreeExudyn(loaded_vehicle).mbs, coordinates, export_subject, omissions)
     from models.engines.free_vehicle_mujoco import compiled_from, specification_of
     from models.engines.mujoco_export import add_shapes
-    from models.engines.mujoco_inertia import realisable
+    from models.engines.mujoco_inertia import with_realisable_inertia
 
-    vehicle, lowered = realisable(loaded_vehicle.vehicle)
+    vehicle, lowered = with_realisable_inertia(loaded_vehicle.vehicle)
     loaded_vehicle = replace(loaded_vehicle, vehicle=vehicle)
     spec = specification_of(loaded_vehicle)
     add_shapes(spec, masses_of_shown_bodies(vehicle, {body.name for body in spec.bodies}))

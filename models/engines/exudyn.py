@@ -25,8 +25,8 @@ from models.engines.exudyn_system import (
     solve,
     solver_counts,
 )
-from models.engines.protocol import check_balance, check_landings, guard
-from models.vehicles.description import PitchSpring, Point, Strut, Vehicle, matrices
+from models.engines.protocol import check_balance, check_landings, check_trajectory
+from models.vehicles.description import PitchSpring, PlaneVehicle, Point, Strut, mass_damping_stiffness
 
 Reader = Callable[[Any, float, float], float]
 """Function that Exudyn calls at a stage's time: (system, time in s, constant load) -> value."""
@@ -143,7 +143,7 @@ def _linear_vehicle(assembly: Assembly) -> PitchPlaneBuild:
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     linear = tuple(strut for strut in assembly.vehicle.struts if not strut.pushes_only)
-    mass, damping, stiffness = matrices(replace(assembly.vehicle, struts=linear))
+    mass, damping, stiffness = mass_damping_stiffness(replace(assembly.vehicle, struts=linear))
     zero = [0.0] * len(mass)
     start = dict.fromkeys(("referenceCoordinates", "initialCoordinates", "initialCoordinates_t"), zero)
     node = mbs.AddNode(items.NodeGenericODE2(**start, numberOfODE2Coordinates=len(mass)))
@@ -169,7 +169,7 @@ def native_elements(assembly: Assembly) -> PitchPlaneBuild:
     return _exact_bodies(assembly) if assembly.vehicle.geometry == "exact" else _linear_vehicle(assembly)
 
 
-def coordinate_indices(exudyn_build: PitchPlaneBuild, vehicle: Vehicle) -> list[int]:
+def coordinate_indices(exudyn_build: PitchPlaneBuild, vehicle: PlaneVehicle) -> list[int]:
     """Index of each of the four coordinates in Exudyn's vector, once the system is assembled."""
     if vehicle.geometry == "linear":
         return [0, 1, 2, 3]
@@ -336,7 +336,7 @@ class ExudynModel:
         note = solve(self.built.mbs, self.settings, options)
         times, states = self._recorded_states()
         enforced = self._enforced()
-        guard("exudyn", times, states, self.settings.duration, note, enforced)
+        check_trajectory("exudyn", times, states, self.settings.duration, note, enforced)
         check_landings("exudyn", self.assembly, self.settings, times, states)
         counts = solver_counts(self.built.mbs)
         if enforced is not None:

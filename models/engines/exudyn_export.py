@@ -70,14 +70,14 @@ def python_script(mbs: Any, coordinate_indices: dict[str, int], head_comment: st
 
     coordinate_indices : place of every coordinate in Exudyn's vectors, by its name; head_comment : for people, at its
     head."""
-    lines = _Writer(mbs).script_lines()
+    lines = _ScriptWriter(mbs).script_lines()
     text = head_comment.replace("\\", "/").replace('"""', "'''")
     return SCRIPT_TEMPLATE.format(comment=text, coordinates=coordinate_indices, lines="\n".join(lines))
 
 
 def item_counts(mbs: Any) -> Sequence[str]:
     """Texts with the numbers of nodes, objects, markers and loads that the exported script builds."""
-    writer = _Writer(mbs)
+    writer = _ScriptWriter(mbs)
     writer.script_lines()
     return [f"{count} {kind}s" for kind, count in writer.counts.items() if count]
 
@@ -85,7 +85,7 @@ def item_counts(mbs: Any) -> Sequence[str]:
 def items_with_functions(mbs: Any) -> tuple[str, ...]:
     """Names of the items that an exported script lacks because their law is a function, and of those whose added force
     it lacks."""
-    writer, data = _Writer(mbs), mbs.systemData
+    writer, data = _ScriptWriter(mbs), mbs.systemData
     places = [("object", i) for i in range(data.NumberOfObjects())] + [("load", i) for i in range(data.NumberOfLoads())]
     acting = (
         (kind, item) for kind, item in ((kind, writer.item(kind, i)) for kind, i in places) if _has_force_function(item)
@@ -102,7 +102,7 @@ def _has_force_function(exudyn_item: dict[str, Any]) -> bool:
 
 
 @dataclass
-class _Writer:
+class _ScriptWriter:
     """Writer of the script lines that rebuild an Exudyn system. Each item is written once, before the first item that
     refers to it."""
 

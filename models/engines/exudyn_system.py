@@ -9,7 +9,7 @@ import exudyn as exu
 import exudyn.itemInterface as typed_items
 import numpy as np
 
-from models.core.waiting import simulation_progress
+from models.core.waiting import report_simulation_progress
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
 
@@ -146,7 +146,7 @@ def solve(mbs: Any, run_settings: Settings, solver_options: Any = None) -> str:
     ti = solver_options.timeIntegration
     ti.numberOfSteps, ti.endTime, ti.verboseMode = run_settings.steps, run_settings.duration, 0
     ti.adaptiveStep = ti.explicit.computeEndOfStepAccelerations = False
-    with simulation_progress(lambda: mbs.systemData.GetTime() / run_settings.duration):
+    with report_simulation_progress(lambda: mbs.systemData.GetTime() / run_settings.duration):
         return solver_failure(mbs, run_settings.integrator, solver_options)
 
 

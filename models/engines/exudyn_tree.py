@@ -13,8 +13,8 @@ import exudyn as exu
 import numpy as np
 
 from models.engines.exudyn_system import KINDS, items, lists
-from models.vehicles.free_vehicle import freedom_axes, joints, last_coordinate_and_joint
-from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle, Vector, steiner
+from models.vehicles.free_vehicle import freedom_axes, joint_table, last_coordinate_and_joint
+from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle, Vector, point_mass_inertia
 from models.vehicles.spatial_linear import Preloads
 
 JOINT_TYPES = {
@@ -140,9 +140,9 @@ class Link:
         centre = (self.mass * self.centre + body.mass * mass_centre) / mass if mass else mass_centre
         self.inertia = (
             self.inertia
-            + steiner(self.mass, self.centre - centre)
+            + point_mass_inertia(self.mass, self.centre - centre)
             + np.array(body.inertia, float)
-            + steiner(body.mass, mass_centre - centre)
+            + point_mass_inertia(body.mass, mass_centre - centre)
         )
         self.mass, self.centre = mass, centre
 
@@ -155,7 +155,7 @@ def add_tree(tree_build: TreeBuild, bodies: list[Body]) -> None:
     """
     part = replace(tree_build.vehicle, bodies=tuple(bodies))
     rows, places, ends = (
-        joints(part),
+        joint_table(part),
         part.coordinates(),
         {body.name: last_coordinate_and_joint(part, body.name) for body in bodies},
     )

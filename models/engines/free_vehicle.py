@@ -29,7 +29,7 @@ from models.engines.native_parts import (
     TurningSpring,
     joint_parts,
 )
-from models.engines.protocol import guard, settings_of
+from models.engines.protocol import check_trajectory, settings_of
 from models.vehicles.spatial import SpatialVehicle
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ ENGINES = ("exudyn", "mujoco")
 
 
 @dataclass(frozen=True, eq=False)
-class Driven:
+class LoadedVehicle:
     """A free vehicle with the forces on it, from which an engine builds its model. vehicle : every body directly before
     those that it carries; gravity (3,) in m/s^2.
 
@@ -87,7 +87,7 @@ class FreeModel(ABC):
 
     ENGINE: ClassVar[str]
 
-    driven: Driven
+    driven: LoadedVehicle
     size: int
     settings: Settings | None
     step: float
@@ -129,11 +129,11 @@ class FreeModel(ABC):
         steps, step = settings.steps, settings.step
         states = self.march(rest if q is None else q, rest if v is None else v, steps, step)
         times = step * np.arange(steps + 1)
-        guard(self.ENGINE, times, states, steps * step)
+        check_trajectory(self.ENGINE, times, states, steps * step)
         return Trajectory(times, states, counts={"steps": steps, "force calls": 4 * steps})
 
 
-class Plain(FreeModel):
+class PlainModel(FreeModel):
     """The independent reference: equations of a vehicle in plain Python, integrated with numpy; it has no table of
     numbers."""
 
@@ -146,12 +146,8 @@ class Plain(FreeModel):
     ) -> None:
         """acceleration_function : function that gives accelerations (n,) at a time (s), positions and rates (n,);
         engine : name of a run."""
-        self.ENGINE, self.equations, self.size, self.settings = (
-            engine,
-            acceleration_function,
-            coordinate_count,
-            run_settings,
-        )  # type: ignore[misc]
+        self.ENGINE = engine  # type: ignore[misc]
+        self.equations, self.size, self.settings = acceleration_function, coordinate_count, run_settings
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), from positions and rates (n,)."""
@@ -169,7 +165,7 @@ class Plain(FreeModel):
         return march(self.equations, q, v, steps, step)
 
 
-def free_model(engine: str, loaded_vehicle: Driven, run_settings: Settings | None = None) -> FreeModel:
+def free_model(engine: str, loaded_vehicle: LoadedVehicle, run_settings: Settings | None = None) -> FreeModel:
     """The free vehicle in "exudyn" or "mujoco"; ``run_settings`` are needed for runs, not for single steps."""
     if engine not in ENGINES:
         raise InputError("", "engine", engine, "no such engine", ENGINES)
@@ -177,7 +173,7 @@ def free_model(engine: str, loaded_vehicle: Driven, run_settings: Settings | Non
     return model
 
 
-def native_elements_and_joints(engine: str, loaded_vehicle: Driven) -> tuple[tuple[str, ...], int]:
+def native_elements_and_joints(engine: str, loaded_vehicle: LoadedVehicle) -> tuple[tuple[str, ...], int]:
     """Names of the springs, mounts and bars that a built model of an engine itself computes, and the number of its
     joints.
 
@@ -202,7 +198,9 @@ def native_share(
     count = len(vehicle.springs) + len(along)
     for engine in ENGINES:
         parts = (*along, *(native_parts or {}).get(engine, ()))
-        names, joints = native_elements_and_joints(engine, Driven(vehicle, np.zeros(3), np.zeros(1), None, None, parts))
+        names, joints = native_elements_and_joints(
+            engine, LoadedVehicle(vehicle, np.zeros(3), np.zeros(1), None, None, parts)
+        )
         told = f"{engine}: bodies and {joints} joints, {len(names)} of {count} springs and {bars} bars"
         lines.append(("native", told))
     why = "their axes turn with the carrier alone, beside which both their ends roll and pitch: no element has that"

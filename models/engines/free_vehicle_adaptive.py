@@ -12,7 +12,7 @@ from models.core.errors import RunFailed
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.free_vehicle import FreeModel
-from models.engines.protocol import guard
+from models.engines.protocol import check_trajectory
 
 ABSOLUTE_TOLERANCE_RATIO = 1e-2
 """Ratio of the absolute tolerance (m, rad, per s) to the relative tolerance."""
@@ -29,7 +29,7 @@ def march_adaptively(free_model: FreeModel, q: np.ndarray, v: np.ndarray, run_se
     march, initial_state = (_in_exudyn if free_model.ENGINE == "exudyn" else _by_scipy), np.concatenate((q, v))
     states, counts = march(free_model, initial_state, run_settings)
     times = run_settings.step * np.arange(run_settings.steps + 1)
-    guard(free_model.ENGINE, times, states, run_settings.steps * run_settings.step)
+    check_trajectory(free_model.ENGINE, times, states, run_settings.steps * run_settings.step)
     return Trajectory(times, states, counts=counts)
 
 

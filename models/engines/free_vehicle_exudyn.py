@@ -19,7 +19,7 @@ from models.engines.exudyn_system import (
     solve,
 )
 from models.engines.exudyn_tree import TreeBuild, add_tree
-from models.engines.free_vehicle import Driven, FreeModel
+from models.engines.free_vehicle import FreeModel, LoadedVehicle
 from models.engines.native_exudyn import (
     CoordinateConnectors,
     add_body_load,
@@ -35,7 +35,7 @@ from models.engines.native_parts import rotors
 from models.vehicles.spatial_linear import Preloads
 
 
-def native_elements_and_joints(loaded_vehicle: Driven) -> tuple[tuple[str, ...], int]:
+def native_elements_and_joints(loaded_vehicle: LoadedVehicle) -> tuple[tuple[str, ...], int]:
     """Names of the elements that have an object in the built system, and the number of joints of its tree."""
     model = FreeExudyn(loaded_vehicle)
     names = built_elements(model.mbs, [part.element.name for part in loaded_vehicle.parts])
@@ -47,7 +47,7 @@ class FreeExudyn(FreeModel):
 
     ENGINE = "exudyn"
 
-    def __init__(self, loaded_vehicle: Driven, run_settings: Settings | None = None) -> None:
+    def __init__(self, loaded_vehicle: LoadedVehicle, run_settings: Settings | None = None) -> None:
         self.driven, self.size, self.settings, bodies = (
             loaded_vehicle,
             loaded_vehicle.size,

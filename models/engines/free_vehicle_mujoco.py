@@ -8,13 +8,13 @@ import numpy as np
 
 from models.core.errors import RunFailed
 from models.engines.assembly import Settings
-from models.engines.free_vehicle import Driven, FreeModel
+from models.engines.free_vehicle import FreeModel, LoadedVehicle
 from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_layout import check_offsets
 from models.engines.mujoco_march import GAVE_UP, Marcher
-from models.engines.mujoco_native import Native, native
-from models.engines.mujoco_quiet import installed, without_warnings
-from models.engines.mujoco_tree import MujocoIndices, keep_small_turns, set_masses, spec_of
+from models.engines.mujoco_native import NativeMujoco, native_mujoco
+from models.engines.mujoco_quiet import installed_callback, without_warnings
+from models.engines.mujoco_tree import MujocoIndices, keep_small_turns, mujoco_specification, set_masses
 from models.engines.native_mujoco import (
     add_body_load,
     add_connection,
@@ -52,10 +52,10 @@ def mergeable_carriers(vehicle: SpatialVehicle) -> dict[str, str]:
     return only
 
 
-def specification_of(loaded_vehicle: Driven) -> mujoco.MjSpec:
+def specification_of(loaded_vehicle: LoadedVehicle) -> mujoco.MjSpec:
     """MuJoCo specification with bodies, joints, springs and space for the callback's numbers, which ``compiled_from``
     fills in."""
-    spec = spec_of(loaded_vehicle.vehicle, 1e-3, _merged_bodies(loaded_vehicle))
+    spec = mujoco_specification(loaded_vehicle.vehicle, 1e-3, _merged_bodies(loaded_vehicle))
     add_parts(spec, loaded_vehicle.vehicle, loaded_vehicle.parts)
     add_rotors(spec, loaded_vehicle.vehicle, rotors(loaded_vehicle.vehicle))
     for spring in loaded_vehicle.ground_springs:
@@ -74,7 +74,7 @@ def specification_of(loaded_vehicle: Driven) -> mujoco.MjSpec:
     return spec
 
 
-def _merged_bodies(loaded_vehicle: Driven) -> dict[str, str]:
+def _merged_bodies(loaded_vehicle: LoadedVehicle) -> dict[str, str]:
     """Bodies that are merged with the only body that they carry: those of ``mergeable_carriers`` at which no spring or
     constraint ends."""
     end_bodies_of_springs = [body for line in loaded_vehicle.line_springs for body, _ in line.ends]
@@ -85,7 +85,7 @@ def _merged_bodies(loaded_vehicle: Driven) -> dict[str, str]:
     return {name: rider for name, rider in mergeable_carriers(loaded_vehicle.vehicle).items() if name not in bearing}
 
 
-def compiled_from(mujoco_spec: mujoco.MjSpec, loaded_vehicle: Driven) -> mujoco.MjModel:
+def compiled_from(mujoco_spec: mujoco.MjSpec, loaded_vehicle: LoadedVehicle) -> mujoco.MjModel:
     """MuJoCo model compiled from the specification of ``specification_of``, with all its numbers but without the
     callback."""
     model = mujoco_spec.compile()
@@ -105,13 +105,13 @@ def compiled_from(mujoco_spec: mujoco.MjSpec, loaded_vehicle: Driven) -> mujoco.
     return model
 
 
-def compiled_model(loaded_vehicle: Driven) -> mujoco.MjModel:
+def compiled_model(loaded_vehicle: LoadedVehicle) -> mujoco.MjModel:
     """Compiled MuJoCo model of a free vehicle with bodies, joints, springs and the callback's numbers, but without the
     callback."""
     return compiled_from(specification_of(loaded_vehicle), loaded_vehicle)
 
 
-def native_elements_and_joints(loaded_vehicle: Driven) -> tuple[tuple[str, ...], int]:
+def native_elements_and_joints(loaded_vehicle: LoadedVehicle) -> tuple[tuple[str, ...], int]:
     """Names of the elements that have a tendon or an actuator in the built model, and the number of its joints."""
     model = compiled_model(loaded_vehicle)
     return built_elements(model), int(model.njnt)
@@ -122,7 +122,7 @@ class FreeMujoco(FreeModel):
 
     ENGINE = "mujoco"
 
-    def __init__(self, loaded_vehicle: Driven, run_settings: Settings | None = None) -> None:
+    def __init__(self, loaded_vehicle: LoadedVehicle, run_settings: Settings | None = None) -> None:
         self.driven, self.size, self.settings = loaded_vehicle, loaded_vehicle.size, run_settings
         self.model = compiled_model(loaded_vehicle)
         self.data = mujoco.MjData(self.model)
@@ -139,12 +139,12 @@ class FreeMujoco(FreeModel):
     def at_step(self, time_step: float) -> Iterator[None]:
         """Context for a march in steps of ``time_step`` (s), in which the callback is installed."""
         self.model.opt.timestep = time_step
-        with installed(self.law):
+        with installed_callback(self.law):
             yield
 
-    def compiled(self) -> Native:
+    def compiled(self) -> NativeMujoco:
         """Handle with which compiled code calls MuJoCo: its functions and arrays."""
-        return native(self.model, self.data)
+        return native_mujoco(self.model, self.data)
 
     def plan(self) -> dict[str, int]:
         """Counts of built items: degrees of freedom, native items, callbacks."""
@@ -155,7 +155,7 @@ class FreeMujoco(FreeModel):
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) from MuJoCo's ``mj_forward``."""
         self.data.time, self.data.qpos[:], self.data.qvel[:] = time, q, v
-        with installed(self.law):
+        with installed_callback(self.law):
             mujoco.mj_forward(self.model, self.data)
         return self.data.qacc.copy()
 
@@ -178,7 +178,7 @@ class FreeMujoco(FreeModel):
         self.model.opt.timestep, start = step, np.concatenate((q, v))
         if steps == 1:
             return np.vstack((start, self._stepped(q, v, step)))
-        with installed(self.law):
+        with installed_callback(self.law):
             return np.vstack((start, self._marcher.run(start[None], steps)[0]))
 
     def _stepped(self, q: np.ndarray, v: np.ndarray, time_step: float) -> np.ndarray:
@@ -186,7 +186,7 @@ class FreeMujoco(FreeModel):
         zero."""
         data = self.data
         data.time, data.qpos[:], data.qvel[:] = 0.0, q, v
-        with installed(self.law):
+        with installed_callback(self.law):
             mujoco.mj_step(self.model, data)
         after = np.concatenate((data.qpos, data.qvel))
         if data.time < 0.5 * time_step or not np.isfinite(after).all():

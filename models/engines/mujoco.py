@@ -18,9 +18,9 @@ from models.core.errors import RunFailed
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.mujoco_march import FORCE_CALLS, march
-from models.engines.mujoco_quiet import installed
-from models.engines.protocol import check_landings, guard
-from models.vehicles.description import Strut, Vehicle
+from models.engines.mujoco_quiet import installed_callback
+from models.engines.protocol import check_landings, check_trajectory
+from models.vehicles.description import PlaneVehicle, Strut
 
 INTEGRATORS = {
     "RK4": mujoco.mjtIntegrator.mjINT_RK4,
@@ -33,7 +33,7 @@ INTEGRATORS = {
 
 
 def specification(
-    vehicle: Vehicle, run_settings: Settings, prescribed_coordinates: Collection[int] = ()
+    vehicle: PlaneVehicle, run_settings: Settings, prescribed_coordinates: Collection[int] = ()
 ) -> mujoco.MjSpec:
     """MuJoCo specification with bodies and joints of the vehicle, without joints for the prescribed coordinates
     ``prescribed_coordinates``, which stay at zero."""
@@ -73,7 +73,7 @@ def specification(
 
 
 def _add_suspension(
-    mujoco_spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, free_joints: set[tuple[str, str]]
+    mujoco_spec: mujoco.MjSpec, vehicle: PlaneVehicle, strut: Strut, free_joints: set[tuple[str, str]]
 ) -> None:
     """Add a suspension strut: as a fixed tendon with linear geometry, or as a site actuator with exact geometry."""
     if vehicle.geometry == "linear":
@@ -238,16 +238,16 @@ class MujocoModel:
         """Trajectory over the whole duration; raises RunFailed unless it is complete and finite."""
         n = self.settings.steps
         states, free = np.empty((n + 1, 8)), [*self.free, *(4 + i for i in self.free)]
-        with installed(self.drive.law):
+        with installed_callback(self.drive.law):
             states[:, free] = march(self.model, self.data, self.assembly.initial[free], self.controls())
         times = self.settings.step * np.arange(n + 1)
         if self.guided:
             inputs = self.signal.sample(0.0, self.settings.step, n + 1)
             states[:, [*self.guided, *(4 + i for i in self.guided)]] = inputs[:, 2 : 2 + 2 * len(self.guided)]
-        guard("mujoco", times, states, self.settings.duration)
+        check_trajectory("mujoco", times, states, self.settings.duration)
         check_landings("mujoco", self.assembly, self.settings, times, states)
         enforced = self._enforced(times, states) if self.guided else None
-        guard("mujoco", times, states, self.settings.duration, enforcing_forces=enforced)
+        check_trajectory("mujoco", times, states, self.settings.duration, enforcing_forces=enforced)
         calls = n * FORCE_CALLS.get(self.settings.integrator, 1)
         return Trajectory(times, states, enforced, {"steps": n, "force calls": calls})
 
@@ -263,7 +263,7 @@ class MujocoModel:
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (4,) in m/s^2 and rad/s^2 at a time (s), from coordinates and rates (4,)."""
         out = np.empty(4)
-        with installed(self.drive.law):
+        with installed_callback(self.drive.law):
             out[self.free] = self._free_acceleration(time, q, v, round(time / self.settings.step))
         if self.guided:
             out[self.guided] = self.signal.at(time)[-len(self.guided) :]
@@ -287,7 +287,7 @@ class MujocoModel:
         full = _compiled_model(self.assembly, self.settings, ModelInput())
         data, enforced = mujoco.MjData(full), np.empty((len(times), len(self.guided)))
         accelerations = np.empty((len(times), 4))
-        with installed(self.drive.law):
+        with installed_callback(self.drive.law):
             for i, time in enumerate(times):
                 accelerations[i, self.free] = self._free_acceleration(time, states[i, :4], states[i, 4:], i)
         signal = self.signal.sample(0.0, self.settings.step, len(times))

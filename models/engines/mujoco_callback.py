@@ -18,7 +18,7 @@ from numba import cfunc, types
 from numba.extending import register_jitable
 
 from models.engines.mujoco_layout import offsets
-from models.machine.compiled import callback, named_closure
+from models.machine.compiled import callback, closure_with_unique_name
 from models.machine.stack import array_at, double_at
 
 HEADER, PER_ROAD = 7, 4
@@ -56,7 +56,7 @@ def kernel_law(force_kernel: Any) -> Any:
     if force_kernel.stats.cache_path is None:
         return cfunc(CALLBACK)(of_kernel)
     return callback(
-        named_closure(of_kernel, force_kernel.__module__.replace(".", "_"), force_kernel.__name__), CALLBACK
+        closure_with_unique_name(of_kernel, force_kernel.__module__.replace(".", "_"), force_kernel.__name__), CALLBACK
     )
 
 

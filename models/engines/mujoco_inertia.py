@@ -19,7 +19,7 @@ REPORTED_SHARE = 1e-9
 """Relative reduction of a principal moment of inertia above which it is reported."""
 
 
-def realisable(vehicle: SpatialVehicle) -> tuple[SpatialVehicle, list[str]]:
+def with_realisable_inertia(vehicle: SpatialVehicle) -> tuple[SpatialVehicle, list[str]]:
     """The vehicle with inertia tensors that MuJoCo's compiler accepts, and sentences on the inertia that is lost by
     that."""
     tensors = {body.name: np.array(body.inertia, float) for body in vehicle.bodies}

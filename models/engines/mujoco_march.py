@@ -7,9 +7,9 @@ import numpy as np
 from mujoco import rollout
 
 from models.core.errors import RunFailed
-from models.core.waiting import simulation_progress
+from models.core.waiting import report_simulation_progress
 from models.engines.mujoco_quiet import without_warnings
-from models.engines.protocol import guard
+from models.engines.protocol import check_trajectory
 
 STEPS_PER_CHUNK = 4096
 """Number of steps between two checks of a run."""
@@ -39,14 +39,14 @@ def march(
     path[0, 0], path[0, 1:] = 0.0, start_state
     for warning in mujoco_data.warning:
         warning.number = 0
-    with without_warnings(), simulation_progress(lambda: mujoco_data.time / times[-1]):
+    with without_warnings(), report_simulation_progress(lambda: mujoco_data.time / times[-1]):
         for first, last in _chunks(steps):
             rows, held = path[first + 1 : last + 1], controls[None, first:last] if controls.size else None
             rollout.rollout(mujoco_model, mujoco_data, path[None, first], held, nstep=len(rows), state=rows[None])
             late = np.abs(rows[:, 0] - times[first + 1 : last + 1]) > 1e-6 * times[-1]
             if late.any() or warning_text(mujoco_data):
                 end = first + (int(np.argmax(late)) if late.any() else len(rows))
-                guard("mujoco", times[: end + 1], path[: end + 1, 1:], times[end])
+                check_trajectory("mujoco", times[: end + 1], path[: end + 1, 1:], times[end])
                 raise RunFailed("mujoco", f"{GAVE_UP}{warning_text(mujoco_data)}", times[end], path[end, 1:])
     return path[:, 1:]
 
@@ -66,7 +66,7 @@ class Marcher:
     def run(self, start_states: np.ndarray, step_count: int) -> np.ndarray:
         """States (n, steps, 2 m) of n runs that start at ``start_states`` (n, 2 m); RunFailed unless all are finite."""
         whole = np.concatenate((np.zeros((len(start_states), 1)), start_states), axis=1)
-        with simulation_progress(lambda: self._data[0].time / (step_count * self.model.opt.timestep)):
+        with report_simulation_progress(lambda: self._data[0].time / (step_count * self.model.opt.timestep)):
             path = rollout.rollout(self.model, self._data, whole, nstep=step_count)[0][..., : 1 + 2 * self.model.nv]
         late = path[:, -1, 0] < (step_count - 0.5) * self.model.opt.timestep
         failed = late | ~np.isfinite(path[:, -1]).all(axis=1)  # MuJoCo starts again at time zero where it gives up

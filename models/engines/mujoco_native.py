@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _intrinsic: Any = intrinsic
 
 
-class Native(NamedTuple):
+class NativeMujoco(NamedTuple):
     """A MuJoCo model for compiled functions: views of MuJoCo's own arrays, and addresses as integers.
 
     place, rate, acceleration (n,) : of the coordinates; time (1,) : s; forward, step, model, data : addresses.
@@ -60,15 +60,15 @@ def _library() -> ctypes.CDLL:
     return ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco*"))))
 
 
-def native(mujoco_model: "mujoco.MjModel", mujoco_data: "mujoco.MjData") -> Native:
-    """``Native`` of a MuJoCo model and its data, for compiled functions; both must outlive the result."""
+def native_mujoco(mujoco_model: "mujoco.MjModel", mujoco_data: "mujoco.MjData") -> NativeMujoco:
+    """``NativeMujoco`` of a MuJoCo model and its data, for compiled functions; both must outlive the result."""
     from models.engines.mujoco_layout import offset
 
     time = ctypes.c_double.from_address(mujoco_data._address + offset("mjData", "time"))
     forward, step = (
         ctypes.cast(getattr(_library(), name), ctypes.c_void_p).value or 0 for name in ("mj_forward", "mj_step")
     )
-    return Native(
+    return NativeMujoco(
         mujoco_data.qpos,
         mujoco_data.qvel,
         mujoco_data.qacc,

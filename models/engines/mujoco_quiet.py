@@ -22,7 +22,7 @@ def without_warnings() -> Iterator[None]:
 
 
 @contextmanager
-def installed(compiled_callback: Any) -> Iterator[None]:
+def installed_callback(compiled_callback: Any) -> Iterator[None]:
     """Context in which a compiled MuJoCo callback, or none, is installed: MuJoCo's callbacks are global to the process.
 
     Meanwhile MuJoCo is quiet: what it would warn of is raised by whoever runs it. RunFailed where another one is.

@@ -19,7 +19,7 @@ NO_CARRIERS: Mapping[str, str] = {}
 """Merged bodies (name of the carrier to name of the carried body) of a vehicle in which none are merged."""
 
 
-def spec_of(
+def mujoco_specification(
     vehicle: SpatialVehicle, time_step: float, merged_carriers: Mapping[str, str] = NO_CARRIERS
 ) -> mujoco.MjSpec:
     """MuJoCo specification with the vehicle's bodies and joints; masses and inertias are 1 until ``set_masses`` sets
@@ -35,7 +35,7 @@ def spec_of(
     off = mujoco.mjtDisableBit
     spec.option.disableflags |= off.mjDSBL_AUTORESET | off.mjDSBL_CONTACT | off.mjDSBL_CONSTRAINT
     for body in (body for body in vehicle.bodies if body.name not in merged_carriers):
-        joined = [part for part in vehicle.bodies if _merged(merged_carriers, part.name) == body.name]
+        joined = [part for part in vehicle.bodies if _merged_body(merged_carriers, part.name) == body.name]
         parent = joined[0].parent
         below = spec.worldbody if parent is None else spec.body(numbers[parent])
         built = below.add_body(
@@ -57,7 +57,7 @@ def spec_of(
     return spec
 
 
-def _merged(merged_carriers: Mapping[str, str], body_name: str) -> str:
+def _merged_body(merged_carriers: Mapping[str, str], body_name: str) -> str:
     """Name of the body with which a body is merged in MuJoCo; the body itself if it is not merged."""
     while body_name in merged_carriers:
         body_name = merged_carriers[body_name]
@@ -87,7 +87,7 @@ class MujocoIndices:
         self, vehicle: SpatialVehicle, mujoco_model: mujoco.MjModel, merged_carriers: Mapping[str, str] = NO_CARRIERS
     ) -> None:
         order = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
-        self.bodies = {name: int(mujoco_model.body(order[_merged(merged_carriers, name)]).id) for name in order}
+        self.bodies = {name: int(mujoco_model.body(order[_merged_body(merged_carriers, name)]).id) for name in order}
         self.joints: dict[tuple[str, str], int] = {
             (name, freedom): int(mujoco_model.joint(f"{order[name]} {freedom}").id)
             for name, freedom in vehicle.coordinates()

@@ -29,10 +29,10 @@ from models.engines.native_parts import (
     NativePart,
     TurningSpring,
 )
-from models.vehicles.cut_vehicle import Element
-from models.vehicles.free_vehicle import joints, last_coordinate_and_joint
+from models.vehicles.cut_vehicle import CutVehicleElement
+from models.vehicles.free_vehicle import joint_table, last_coordinate_and_joint
 
-Axial = tuple[Element, AxialTravel]
+Axial = tuple[CutVehicleElement, AxialTravel]
 """An element with its travel along an axis."""
 LINK_MASS = 1e-15
 """Mass (kg) and inertia (kg m^2) of a link of an additional tree: Exudyn divides by them, and the vehicle must not feel
@@ -46,7 +46,7 @@ def add_parts(tree_build: TreeBuild, exudyn_node: Any, native_parts: Sequence[Na
     """Add all native parts to an Exudyn system with one tree, whose coordinates are in ``exudyn_node``."""
     coordinates, trees, axial = (
         CoordinateConnectors(tree_build, exudyn_node),
-        _Trees(tree_build, exudyn_node),
+        _AxisFrameTrees(tree_build, exudyn_node),
         list[Axial](),
     )
     for part in native_parts:
@@ -154,7 +154,7 @@ def built_elements(mbs: Any, element_names: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in element_names if _without_separator(name) in listed)
 
 
-def _object_name(*element_names: Element) -> str:
+def _object_name(*element_names: CutVehicleElement) -> str:
     """Name of the Exudyn object that represents these elements."""
     return LAW_PREFIX + NAME_SEPARATOR.join(_without_separator(element.name) for element in element_names)
 
@@ -177,12 +177,12 @@ def _groups_at_one_place(native_parts: Sequence[Axial]) -> list[list[Axial]]:
     return list(groups.values())
 
 
-def _stiffness_and_damping(element: Element) -> dict[str, float]:
+def _stiffness_and_damping(element: CutVehicleElement) -> dict[str, float]:
     """Stiffness and damping of an element, as arguments of an Exudyn item."""
     return {"stiffness": element.stiffness, "damping": element.damping}
 
 
-def _preload_travel(element: Element) -> float:
+def _preload_travel(element: CutVehicleElement) -> float:
     """Travel of a spring at which its force equals its preload."""
     return element.preload / element.stiffness if element.stiffness else 0.0
 
@@ -205,7 +205,7 @@ class CoordinateConnectors:
     def __init__(self, tree_build: TreeBuild, exudyn_node: Any) -> None:
         self.built, self.node, self.markers = tree_build, exudyn_node, dict[int, Any]()
 
-    def add(self, element: Element, coordinate_travel: CoordinateTravel) -> None:
+    def add(self, element: CutVehicleElement, coordinate_travel: CoordinateTravel) -> None:
         """Add one connector for an element, or a matrix object where more than two coordinates take part."""
         if len(coordinate_travel.coordinates) > 2:
             return self._add_matrix(element, coordinate_travel)
@@ -245,13 +245,13 @@ class CoordinateConnectors:
             items.CoordinateConstraint(markerNumbers=markers, factor1=coupling.ratio, offset=-coupling.offset)
         )
 
-    def _add_loads(self, element: Element, coordinate_travel: CoordinateTravel) -> None:
+    def _add_loads(self, element: CutVehicleElement, coordinate_travel: CoordinateTravel) -> None:
         """Add the constant force of an element as loads, since a spring without stiffness has none."""
         for coordinate, factor in zip(coordinate_travel.coordinates, coordinate_travel.factors, strict=True):
             load = items.LoadCoordinate(markerNumber=self._marker(coordinate), load=-factor * element.preload)
             self.built.mbs.AddLoad(load)
 
-    def _add_matrix(self, element: Element, coordinate_travel: CoordinateTravel) -> None:
+    def _add_matrix(self, element: CutVehicleElement, coordinate_travel: CoordinateTravel) -> None:
         """Add an element whose travel is a sum of more than two coordinates, as a stiffness and damping matrix."""
         row = np.zeros(self.built.size(self.node))
         row[list(coordinate_travel.coordinates)] = coordinate_travel.factors
@@ -279,7 +279,7 @@ class CoordinateConnectors:
         return self.markers[-1]
 
 
-class _Trees:
+class _AxisFrameTrees:
     """Additional trees of links, one for each body in which axes of connectors are fixed, and connectors from the
     ground to them."""
 
@@ -321,7 +321,7 @@ class _Trees:
     def _new_tree(self, frame_body: str) -> Any:
         """Exudyn item of the tree of links that a body carries."""
         vehicle = self.built.vehicle
-        rows, places = joints(vehicle), vehicle.coordinates()
+        rows, places = joint_table(vehicle), vehicle.coordinates()
         parents, offsets = rows[:, 1].astype(int), rows[:, 2:].copy()
         for i, (name, _) in enumerate(places):
             carried = frame_body in vehicle.chain(name)[1:]

@@ -27,7 +27,7 @@ from models.engines.native_parts import (
     NativePart,
     TurningSpring,
 )
-from models.vehicles.cut_vehicle import Element
+from models.vehicles.cut_vehicle import CutVehicleElement
 from models.vehicles.spatial import Curve, SpatialVehicle, Vector
 
 UNLIMITED_FORCE = 1e300
@@ -267,7 +267,7 @@ def affine_forces(native_part: NativePart) -> list[AffineForce]:
     return [force for force in shifted if any(force[:3])]
 
 
-def _first_pieces(element: Element) -> Iterator[np.ndarray]:
+def _first_pieces(element: CutVehicleElement) -> Iterator[np.ndarray]:
     """Constant, slope and damping (3,) of the first straight piece of each of an element's two curves, over travel and
     rate."""
     for curve, place in ((element.travel_force, 1), (element.rate_force, 2)):

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from models.vehicles.cut_vehicle import Element
+from models.vehicles.cut_vehicle import CutVehicleElement
 from models.vehicles.spatial import FREEDOMS, JointElement, SpatialVehicle, Vector
 
 ENGINES_WITH_CURVES = ("mujoco",)
@@ -60,7 +60,7 @@ class AxialTravel:
 class NativePart:
     """An element with the terms of its force law that the engine itself computes, and its travel."""
 
-    element: Element
+    element: CutVehicleElement
     travel: CoordinateTravel | AxialTravel
 
 
@@ -181,7 +181,7 @@ class Connection:
 
 
 @dataclass(frozen=True)
-class Division:
+class ElementDivision:
     """Division of a vehicle's elements between an engine and the compiled forces.
 
     native : elements that the engine itself computes; shared : the remainder of each law, which the compiled forces
@@ -189,13 +189,15 @@ class Division:
     """
 
     native: tuple[NativePart, ...]
-    shared: tuple[Element, ...]
+    shared: tuple[CutVehicleElement, ...]
     reasons: dict[str, str] = field(default_factory=dict)
 
 
-def divide(vehicle_tree: SpatialVehicle, elements: Iterable[Element], engine: str) -> Division:
+def divide_between_engine_and_callback(
+    vehicle_tree: SpatialVehicle, elements: Iterable[CutVehicleElement], engine: str
+) -> ElementDivision:
     """Division of the elements of a vehicle's tree between an engine ("exudyn" or "mujoco") and the compiled forces."""
-    native, shared, reasons = list[NativePart](), list[Element](), dict[str, str]()
+    native, shared, reasons = list[NativePart](), list[CutVehicleElement](), dict[str, str]()
     for element in elements:
         travel = travel_of(vehicle_tree, element)
         still = isinstance(travel, CoordinateTravel) and not travel.coordinates
@@ -209,10 +211,12 @@ def divide(vehicle_tree: SpatialVehicle, elements: Iterable[Element], engine: st
         if left is not None:
             shared.append(left)
             reasons[element.name] = "; ".join(why)
-    return Division(tuple(native), tuple(shared), reasons)
+    return ElementDivision(tuple(native), tuple(shared), reasons)
 
 
-def _divided_element(element: Element, engine: str) -> tuple[Element | None, Element | None, list[str]]:
+def _divided_element(
+    element: CutVehicleElement, engine: str
+) -> tuple[CutVehicleElement | None, CutVehicleElement | None, list[str]]:
     """An element with the law's terms that the engine computes, the element with the terms left to a callback, and the
     reasons. A preload goes with the terms that carry it."""
     curved, rough = bool(element.travel_force or element.rate_force), element.friction != 0.0
@@ -255,13 +259,13 @@ def _coordinate_numbers(vehicle: SpatialVehicle, joint_element: JointElement) ->
     return tuple(places[place] for place in joint_element.coordinates)
 
 
-def _joint_force(joint_element: JointElement) -> Element:
+def _joint_force(joint_element: JointElement) -> CutVehicleElement:
     """The force law of a joint element, as an element without points."""
     still, gains = np.zeros(3), (joint_element.stiffness, joint_element.damping, joint_element.preload)
-    return Element(joint_element.name, "", "", still, still, still, *gains, frame="")
+    return CutVehicleElement(joint_element.name, "", "", still, still, still, *gains, frame="")
 
 
-def travel_of(vehicle_tree: SpatialVehicle, element: Element) -> CoordinateTravel | AxialTravel | None:
+def travel_of(vehicle_tree: SpatialVehicle, element: CutVehicleElement) -> CoordinateTravel | AxialTravel | None:
     """The travel of an element in a form that an engine may have, along coordinates or along an axis; None if it has
     neither form."""
     first, two = (
@@ -297,7 +301,10 @@ def _bodies_up_to_frame(vehicle_tree: SpatialVehicle, body: str, frame_body: str
 
 
 def _along_coordinates(
-    vehicle_tree: SpatialVehicle, element: Element, first_chain: tuple[str, ...], second_chain: tuple[str, ...]
+    vehicle_tree: SpatialVehicle,
+    element: CutVehicleElement,
+    first_chain: tuple[str, ...],
+    second_chain: tuple[str, ...],
 ) -> CoordinateTravel:
     """Travel along the sliding coordinates of the bodies between the frame and either end; slides that move both ends
     cancel."""

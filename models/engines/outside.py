@@ -34,8 +34,8 @@ from models.engines import protocol
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, OUTSIDE_CLASSES, RECOMMENDED, Integrator
 from models.engines.model import Model
-from models.engines.protocol import guard
-from models.engines.reference import Reference, derivative_of
+from models.engines.protocol import check_trajectory
+from models.engines.reference import PitchPlaneReference, compiled_derivative
 
 HIGHEST_ORDER = 20
 """Largest order of convergence that an outside integrator may claim."""
@@ -139,7 +139,7 @@ def _returned_array(
 
 
 @dataclass
-class OutsideIntegrator(Reference):
+class OutsideIntegrator(PitchPlaneReference):
     """The reference's equations with an outside integrator; a prescribed pitch is one of their inputs."""
 
     name: str
@@ -150,10 +150,10 @@ class OutsideIntegrator(Reference):
         does."""
         times = self.settings.step * np.arange(self.settings.steps + 1)
         states, calls = self._march(times)
-        guard(self.name, times, states, self.settings.duration)
+        check_trajectory(self.name, times, states, self.settings.duration)
         self._guide(states)
         enforced = self._enforced(times, states)
-        guard(self.name, times, states, self.settings.duration, enforcing_forces=enforced)
+        check_trajectory(self.name, times, states, self.settings.duration, enforcing_forces=enforced)
         return Trajectory(times, states, enforced, {"steps": self.settings.steps, "force calls": calls})
 
     def _march(self, times: np.ndarray) -> tuple[np.ndarray, int]:
@@ -176,7 +176,7 @@ class OutsideIntegrator(Reference):
         self, start_time: float, end_time: float, call_counter: list[int]
     ) -> Callable[[float, np.ndarray], np.ndarray]:
         """Right-hand side (t, y) -> y' over one piece between knots, which counts its calls."""
-        derivative, p, at = derivative_of(*self._key), self._p, self._reader(start_time, end_time)
+        derivative, p, at = compiled_derivative(*self._key), self._p, self._reader(start_time, end_time)
 
         def rhs(t: float, y: np.ndarray) -> np.ndarray:
             call_counter[0] += 1
@@ -208,7 +208,7 @@ class OutsideEngine:
         enforced = getattr(answer, "enforced", None)
         if self.assembly.guided:
             enforced = _returned_array(self.name, "run, as enforced,", enforced, (count, len(self.assembly.guided)))
-        guard(self.name, times, states, self.settings.duration, enforcing_forces=enforced)
+        check_trajectory(self.name, times, states, self.settings.duration, enforcing_forces=enforced)
         return Trajectory(times, states, enforced, dict(getattr(answer, "counts", {})))
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:

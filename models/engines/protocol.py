@@ -11,7 +11,7 @@ import numpy as np
 from models.core.errors import Refused, RunFailed
 from models.core.resolved import check_resolved
 from models.core.signals import Signal
-from models.core.steps import divides, dividing_step
+from models.core.steps import dividing_step, step_divides
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, OUTSIDE_CLASSES, UNAVAILABLE_INTEGRATORS, Integrator
 from models.engines.model import Model
@@ -102,7 +102,7 @@ def _check_sampling(
 
 def _refuse_uneven_step(engine: str, time_step: float, length_name: str, time_length: float) -> None:
     """Raise Refused if the step (s) does not divide a length of time (s)."""
-    if not divides(time_step, time_length):
+    if not step_divides(time_step, time_length):
         raise Refused(
             engine,
             f"the step {time_step:g} s does not divide {length_name} {time_length:g} s; "
@@ -117,7 +117,7 @@ def settings_of(engine: str, run_settings: Settings | None) -> Settings:
     return run_settings
 
 
-def guard(
+def check_trajectory(
     engine: str,
     times: np.ndarray,
     states: np.ndarray,

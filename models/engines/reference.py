@@ -12,12 +12,12 @@ import numpy as np
 from numba.extending import register_jitable
 
 from models.core.errors import RunFailed
-from models.core.signals import Stacked
+from models.core.signals import StackedSignal
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import check_landings, guard
-from models.machine.compiled import named_closure, njit
+from models.engines.protocol import check_landings, check_trajectory
+from models.machine.compiled import closure_with_unique_name, njit
 from models.vehicles.pitch_plane_equations import ADDED_TERMS, RIGHT_HAND_SIDES, parameter_numbers
 
 FLAT_ROAD_INPUT = np.zeros((1, 4))
@@ -26,7 +26,7 @@ FLAT_ROAD_INPUT = np.zeros((1, 4))
 
 def compiled_closure(closure: Any, cache_key: tuple) -> Any:
     """A compiled closure with its own index in numba's cache, which closures of one factory would otherwise share."""
-    closure = named_closure(closure, *cache_key)
+    closure = closure_with_unique_name(closure, *cache_key)
     return njit(cache=True, nogil=True, error_model="numpy")(closure)  # no check for masses of zero: there are none
 
 
@@ -79,11 +79,11 @@ def _summed_right_hand_side(right_hand_side, added_terms):
         right_hand_side(state, inputs, parameters, state_rates)
         added_terms(state, inputs, parameters, state_rates)
 
-    return register_jitable(named_closure(total, right_hand_side.__name__, added_terms.__name__))
+    return register_jitable(closure_with_unique_name(total, right_hand_side.__name__, added_terms.__name__))
 
 
 @dataclass
-class Reference:
+class PitchPlaneReference:
     """The pitch-plane vehicle as compiled equations of motion, marched by fixed steps or by an adaptive solver."""
 
     assembly: Assembly
@@ -100,7 +100,7 @@ class Reference:
         self._input = (
             assembly.input
             if assembly.input is None or assembly.moment is None
-            else Stacked((assembly.input, assembly.moment))
+            else StackedSignal((assembly.input, assembly.moment))
         )
         self._p = parameter_numbers(assembly.parameters, assembly.vehicle)
 
@@ -108,15 +108,15 @@ class Reference:
         """Trajectory over the whole duration; raises RunFailed unless it is complete and finite."""
         adaptive = CATALOGUE["reference"][self.settings.integrator].adaptive
         times, states, counts = self._march_adaptively() if adaptive else self._march_fixed()
-        guard("reference", times, states, self.settings.duration)
+        check_trajectory("reference", times, states, self.settings.duration)
         check_landings("reference", self.assembly, self.settings, times, states)
         enforced = self._enforced(times, states)
-        guard("reference", times, states, self.settings.duration, enforcing_forces=enforced)
+        check_trajectory("reference", times, states, self.settings.duration, enforcing_forces=enforced)
         return Trajectory(times, states, enforced, counts)
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (4,) in m/s^2 and rad/s^2 at a time (s), from coordinates and rates (4,)."""
-        return derivative_of(*self._key)(np.concatenate((q, v)), self._input_at(time), self._p)[4:]
+        return compiled_derivative(*self._key)(np.concatenate((q, v)), self._input_at(time), self._p)[4:]
 
     def plan(self) -> dict[str, int]:
         """Counts of built items: coordinates, and no native items or callbacks."""
@@ -146,7 +146,7 @@ class Reference:
         n = self.settings.steps
         states = np.empty((n + 1, 8))
         inputs, rows = self._inputs()
-        march = march_of(*self._key)
+        march = compiled_march(*self._key)
         march(self.assembly.initial.copy(), self.settings.step, n, inputs, rows, self._p, states)
         self._guide(states)
         return self.settings.step * np.arange(n + 1), states, {"steps": n, "force calls": 4 * n}
@@ -188,7 +188,7 @@ class Reference:
         """Solution by scipy's adaptive solver between two knots of the input, from the state y (8,)."""
         from scipy.integrate import solve_ivp
 
-        derivative, p, at = derivative_of(*self._key), self._p, self._reader(start_time, end_time)
+        derivative, p, at = compiled_derivative(*self._key), self._p, self._reader(start_time, end_time)
 
         def rhs(t, y):
             dy = derivative(y, at(t), p)
@@ -229,7 +229,7 @@ class Reference:
         if not guided or self.assembly.input is None:
             return None
         inertia = np.array([self.assembly.parameters.m3, self.assembly.parameters.I])[-len(guided) :]
-        free = derivative_of("force", *self._key[1:])
+        free = compiled_derivative("force", *self._key[1:])
         inputs = self.assembly.input.sample(0.0, self.settings.step, len(times))
         without = np.array([free(y, u[:2].copy(), self._p) for y, u in zip(states, inputs, strict=True)])
         return inertia * (inputs[:, -len(guided) :] - without[:, [4 + i for i in guided]])
@@ -248,7 +248,7 @@ def _right_hand_side(input_mode: str, geometry: str, *added_terms: str):
     )
 
 
-def march_of(input_mode: str, geometry: str, *added_terms: str):
+def compiled_march(input_mode: str, geometry: str, *added_terms: str):
     """The compiled fixed-step march for one mode and geometry with the terms ``added_terms``, compiled at the first
     request."""
     key = (input_mode, geometry, *added_terms)
@@ -257,7 +257,7 @@ def march_of(input_mode: str, geometry: str, *added_terms: str):
     return _FIXED[key]
 
 
-def derivative_of(input_mode: str, geometry: str, *added_terms: str):
+def compiled_derivative(input_mode: str, geometry: str, *added_terms: str):
     """The compiled right-hand side (y, u, p) -> dy (8,) for one mode and geometry with the terms ``added_terms``,
     compiled at the first request."""
     key = (input_mode, geometry, *added_terms)
@@ -266,6 +266,6 @@ def derivative_of(input_mode: str, geometry: str, *added_terms: str):
     return _SINGLE[key]
 
 
-def build(assembly: Assembly, run_settings: Settings) -> Reference:
+def build(assembly: Assembly, run_settings: Settings) -> PitchPlaneReference:
     """The reference model of a pitch-plane assembly."""
-    return Reference(assembly, run_settings)
+    return PitchPlaneReference(assembly, run_settings)

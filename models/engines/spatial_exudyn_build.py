@@ -25,7 +25,7 @@ from models.vehicles.spatial import (
     TurnOutput,
     Tyre,
 )
-from models.vehicles.spatial_linear import preloads
+from models.vehicles.spatial_linear import static_preloads
 
 
 @dataclass
@@ -276,7 +276,7 @@ def _trees(vehicle: SpatialVehicle) -> list[list[Body]]:
 def assemble(vehicle: SpatialVehicle, speed: float | None, road_rows: RoadRows) -> TreeBuild:
     """Build the vehicle in a new Exudyn system, which is not assembled yet, so that sensors can be added."""
     mbs = exu.SystemContainer().AddSystem()
-    built = TreeBuild(vehicle, mbs, preloads(vehicle), mbs.AddObject(items.ObjectGround()))
+    built = TreeBuild(vehicle, mbs, static_preloads(vehicle), mbs.AddObject(items.ObjectGround()))
     for bodies in _trees(vehicle):
         if len(bodies) == 1 and bodies[0].freedoms in (("x",), ("y",), ("z",)):
             add_slider(built, bodies[0])

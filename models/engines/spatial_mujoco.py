@@ -12,8 +12,8 @@ from models.engines.assembly import Settings
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_layout import check_offsets
 from models.engines.mujoco_march import FORCE_CALLS, march
-from models.engines.mujoco_quiet import installed
-from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
+from models.engines.mujoco_quiet import installed_callback
+from models.engines.mujoco_tree import MujocoIndices, mujoco_specification, set_masses
 from models.engines.protocol import settings_of
 from models.engines.spatial_mujoco_callback import HEADER, PER_TIME, ROAD, force_elements, packed_numbers, spatial_law
 from models.engines.spatial_protocol import (
@@ -37,7 +37,7 @@ def _compiled_model(
     rows_per_second: float,
 ) -> mujoco.MjModel:
     """The compiled MuJoCo model; its numeric data hold all numbers that the callback reads."""
-    spec = spec_of(vehicle, time_step)
+    spec = mujoco_specification(vehicle, time_step)
     spec.option.integrator = INTEGRATORS[integrator]
     plain = spec.compile()
     counts, content = packed_numbers(vehicle, force_elements(vehicle, speed), plain, MujocoIndices(vehicle, plain))
@@ -76,7 +76,7 @@ class SpatialMujoco:
         before = numbers[PER_TIME], row.copy()
         numbers[PER_TIME] = 0.0
         try:
-            with installed(self.law):
+            with installed_callback(self.law):
                 yield row
         finally:
             numbers[PER_TIME], row[:] = before
@@ -85,7 +85,7 @@ class SpatialMujoco:
         """Accelerations (n,) at a time (s), positions and rates (n,); ``road_row`` (2 w,) replaces the road's row at
         this time: heights (m), then rates (m/s) under w tyres."""
         if road_row is None:
-            with installed(self.law):
+            with installed_callback(self.law):
                 return self._acceleration(q, v, time)
         with self._hold_road() as row:
             row[:] = road_row
@@ -142,7 +142,7 @@ class SpatialMujoco:
         settings, rest = settings_of("mujoco", self.settings), np.zeros(self.model.nv)
         both, start = np.concatenate((self.numbers.columns, rest.size + self.numbers.columns)), np.empty(2 * rest.size)
         start[both] = np.concatenate((rest if q is None else q, rest if v is None else v))
-        with installed(self.law):
+        with installed_callback(self.law):
             path = march(self.model, self.data, start, np.empty((settings.steps, 0)))
         times = settings.step * np.arange(settings.steps + 1)
         counts = {"steps": settings.steps, "force calls": FORCE_CALLS.get(settings.integrator, 1) * settings.steps}

@@ -24,7 +24,7 @@ from models.engines.mujoco_layout import offsets
 from models.engines.mujoco_tree import AXES, MujocoIndices
 from models.machine.stack import array_at, beyond, double_at, doubles
 from models.vehicles.spatial import Curve, SpatialVehicle, Vector
-from models.vehicles.spatial_linear import preloads
+from models.vehicles.spatial_linear import static_preloads
 
 PER_TIME, ROWS, TYRES, BODIES, ELEMENTS, POINTS, ROAD, HEADER = range(8)
 """Indices in the table's header: road rows per second; counts of rows, tyres, bodies that may turn or carry such,
@@ -58,7 +58,7 @@ ActingPoint = tuple[str | None, Vector, Vector]
 """A point at which an element acts: body, point (m) and axis."""
 
 
-class Parts(NamedTuple):
+class ForceLayout(NamedTuple):
     """Layout of a vehicle's bodies, points and elements in MuJoCo's numeric data: counts, and pointers to doubles."""
 
     body_count: int
@@ -80,7 +80,7 @@ class MujocoState(NamedTuple):
     axes: Any
 
 
-class Workspace(NamedTuple):
+class CallbackWorkspace(NamedTuple):
     """Pointers to arrays for results within a call. bodies : twist and wrench of each body (OF_BODY); elements : travel
     and rate, then force, of each element (OF_ELEMENT); levers : lever of each point (OF_POINT)."""
 
@@ -90,111 +90,110 @@ class Workspace(NamedTuple):
 
 
 @register_jitable
-def _three(pointer, vector_index):
+def _vector_at(pointer, vector_index):
     """The vector (three doubles) at index i of a pointer."""
     return pointer[vector_index], pointer[vector_index + 1], pointer[vector_index + 2]
 
 
 @register_jitable
-def _put(pointer, vector_index, vector):
+def _put_vector(pointer, vector_index, vector):
     """Write the vector ``vector`` (three doubles) to index i of a pointer."""
     pointer[vector_index], pointer[vector_index + 1], pointer[vector_index + 2] = vector
 
 
 @register_jitable
-def _plus(a, factor, b):
+def _scaled_sum(a, factor, b):
     """The vector a + factor b."""
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 
 @register_jitable
-def _across(a, b):
+def _cross(a, b):
     """The vector product a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @register_jitable
-def _along(a, b):
+def _dot(a, b):
     """The scalar product a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @register_jitable
-def _move(parts, mujoco_state, workspace):
+def _compute_twists_and_travels(parts, mujoco_state, workspace):
     """Compute the twists of the bodies, clear their wrenches, and add the contributions of the points to the travels
     and rates of the elements."""
     for b in range(parts.body_count):
         body, state = beyond(parts.bodies, PER_BODY * b), beyond(workspace.bodies, OF_BODY * b)
-        turn, shift = _twist(body, mujoco_state, workspace.bodies)
-        _put(state, TURNS, turn)
-        _put(state, SHIFTS, shift)
-        _put(state, MOMENTS, (0.0, 0.0, 0.0))
-        _put(state, FORCES, (0.0, 0.0, 0.0))
+        turn, shift = _body_twist(body, mujoco_state, workspace.bodies)
+        _put_vector(state, TURNS, turn)
+        _put_vector(state, SHIFTS, shift)
+        _put_vector(state, MOMENTS, (0.0, 0.0, 0.0))
+        _put_vector(state, FORCES, (0.0, 0.0, 0.0))
         number = int(body[NUMBER])
-        centre, rows = _three(mujoco_state.centres, 3 * number), beyond(mujoco_state.rotations, 9 * number)
-        x, y, z = _three(rows, 0), _three(rows, 3), _three(rows, 6)
+        centre, rows = _vector_at(mujoco_state.centres, 3 * number), beyond(mujoco_state.rotations, 9 * number)
+        x, y, z = _vector_at(rows, 0), _vector_at(rows, 3), _vector_at(rows, 6)
         for i in range(int(body[POINT]), int(body[BEYOND])):
             point = beyond(parts.points, PER_POINT * i)
-            element, axis = beyond(workspace.elements, OF_ELEMENT * int(point[ELEMENT])), _three(point, AXIS)
-            at = _three(point, PLACE)
-            place = centre[0] + _along(x, at), centre[1] + _along(y, at), centre[2] + _along(z, at)
-            lever = _across(place, axis)
-            element[TRAVEL] += _along(axis, place)
-            element[RATE] += _along(axis, shift) + _along(turn, lever)
-            _put(workspace.levers, OF_POINT * i, lever)
+            element, axis = beyond(workspace.elements, OF_ELEMENT * int(point[ELEMENT])), _vector_at(point, AXIS)
+            at = _vector_at(point, PLACE)
+            place = centre[0] + _dot(x, at), centre[1] + _dot(y, at), centre[2] + _dot(z, at)
+            lever = _cross(place, axis)
+            element[TRAVEL] += _dot(axis, place)
+            element[RATE] += _dot(axis, shift) + _dot(turn, lever)
+            _put_vector(workspace.levers, OF_POINT * i, lever)
 
 
 @register_jitable
-def _twist(body, motion, states):
+def _body_twist(body, motion, states):
     """Angular velocity of a body, and the velocity of its point at the origin of space: the parent's twist plus the
     contributions of the body's joints."""
     turn, shift, parent, turning = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), int(body[PARENT]), int(body[TURNING])
     if parent >= 0:
-        turn, shift = _three(states, OF_BODY * parent + TURNS), _three(states, OF_BODY * parent + SHIFTS)
+        turn, shift = _vector_at(states, OF_BODY * parent + TURNS), _vector_at(states, OF_BODY * parent + SHIFTS)
     for j in range(int(body[FIRST]), turning):
-        shift = _plus(shift, motion.rates[j], _three(motion.axes, 3 * j))
+        shift = _scaled_sum(shift, motion.rates[j], _vector_at(motion.axes, 3 * j))
     for j in range(turning, int(body[LAST])):
-        axis, rate = _three(motion.axes, 3 * j), motion.rates[j]
-        turn, shift = _plus(turn, rate, axis), _plus(shift, rate, _across(_three(motion.anchors, 3 * j), axis))
+        axis, rate = _vector_at(motion.axes, 3 * j), motion.rates[j]
+        turn = _scaled_sum(turn, rate, axis)
+        shift = _scaled_sum(shift, rate, _cross(_vector_at(motion.anchors, 3 * j), axis))
     return turn, shift
 
 
 @register_jitable
-def _press(parts, mujoco_state, workspace, joint_forces):
+def _transfer_forces_to_joints(parts, mujoco_state, workspace, joint_forces):
     """Transfer the elements' forces from the bodies to the joints, carried bodies before their carriers."""
     for b in range(parts.body_count - 1, -1, -1):
         body, state = beyond(parts.bodies, PER_BODY * b), beyond(workspace.bodies, OF_BODY * b)
-        moment, force, parent = _three(state, MOMENTS), _three(state, FORCES), int(body[PARENT])
+        moment, force, parent = _vector_at(state, MOMENTS), _vector_at(state, FORCES), int(body[PARENT])
         for i in range(int(body[POINT]), int(body[BEYOND])):
             point = beyond(parts.points, PER_POINT * i)
             pressed = -workspace.elements[OF_ELEMENT * int(point[ELEMENT])]
-            moment = _plus(moment, pressed, _three(workspace.levers, OF_POINT * i))
-            force = _plus(force, pressed, _three(point, AXIS))
+            moment = _scaled_sum(moment, pressed, _vector_at(workspace.levers, OF_POINT * i))
+            force = _scaled_sum(force, pressed, _vector_at(point, AXIS))
         turning = int(body[TURNING])
         for j in range(int(body[FIRST]), turning):
-            joint_forces[j] += _along(_three(mujoco_state.axes, 3 * j), force)
+            joint_forces[j] += _dot(_vector_at(mujoco_state.axes, 3 * j), force)
         for j in range(turning, int(body[LAST])):
-            about = _plus(moment, -1.0, _across(_three(mujoco_state.anchors, 3 * j), force))
-            joint_forces[j] += _along(_three(mujoco_state.axes, 3 * j), about)
+            about = _scaled_sum(moment, -1.0, _cross(_vector_at(mujoco_state.anchors, 3 * j), force))
+            joint_forces[j] += _dot(_vector_at(mujoco_state.axes, 3 * j), about)
         if parent >= 0:
             below = beyond(workspace.bodies, OF_BODY * parent)
-            _put(below, MOMENTS, _plus(moment, 1.0, _three(below, MOMENTS)))
-            _put(below, FORCES, _plus(force, 1.0, _three(below, FORCES)))
+            _put_vector(below, MOMENTS, _scaled_sum(moment, 1.0, _vector_at(below, MOMENTS)))
+            _put_vector(below, FORCES, _scaled_sum(force, 1.0, _vector_at(below, FORCES)))
 
 
 @register_jitable
-def _on_curve(curve_pairs, pair_count, travel_or_rate):
+def _curve_force(pairs, number_count, argument):
     """Force on a curve given as pairs (argument, force, ...); beyond its ends the outer straight pieces continue."""
     i = 0
-    while i < pair_count - 4 and travel_or_rate >= curve_pairs[i + 2]:
+    while i < number_count - 4 and argument >= pairs[i + 2]:
         i += 2
-    return curve_pairs[i + 1] + (curve_pairs[i + 3] - curve_pairs[i + 1]) / (curve_pairs[i + 2] - curve_pairs[i]) * (
-        travel_or_rate - curve_pairs[i]
-    )
+    return pairs[i + 1] + (pairs[i + 3] - pairs[i + 1]) / (pairs[i + 2] - pairs[i]) * (argument - pairs[i])
 
 
 @register_jitable
-def _more(force_law, travel, rate, q):
+def _nonlinear_force(force_law, travel, rate, q):
     """Nonlinear terms of an element's force law (N, or N m) at a travel, its rate and the joint coordinates q: the
     force less that of the law's straight line."""
     force = 0.0
@@ -206,14 +205,14 @@ def _more(force_law, travel, rate, q):
         force += force_law[SECOND_GAIN] * q[int(force_law[SECOND_COORDINATE])]
     over_travel, over_rate = 2 * int(force_law[ON_TRAVEL]), 2 * int(force_law[ON_RATE])
     if over_travel > 0:
-        force += _on_curve(beyond(force_law, CURVES), over_travel, travel)
+        force += _curve_force(beyond(force_law, CURVES), over_travel, travel)
     if over_rate > 0:
-        force += _on_curve(beyond(force_law, CURVES + over_travel), over_rate, rate)
+        force += _curve_force(beyond(force_law, CURVES + over_travel), over_rate, rate)
     return force
 
 
 @register_jitable
-def _act(parts, road_row, tyre_count, mujoco_state, element_travels, joint_forces):
+def _add_element_forces(parts, road_row, tyre_count, mujoco_state, element_travels, joint_forces):
     """Compute the forces of the elements, store them in place of the travels, and add them to the joints that move
     points of bodies which never turn.
 
@@ -235,7 +234,7 @@ def _act(parts, road_row, tyre_count, mujoco_state, element_travels, joint_force
         if e[ONE_SIDED] != 0.0:
             force = min(max(force, 2.0 * elastic), 0.0)
         if more > 0:
-            force += _more(beyond(e, more), travel, rate, q)
+            force += _nonlinear_force(beyond(e, more), travel, rate, q)
         for k in range(SHARES, shares, PER_SHARE):
             joint_forces[int(e[k])] -= force * e[k + SHARE]
         element_travels[OF_ELEMENT * i] = force
@@ -257,8 +256,8 @@ def spatial_law() -> Any:
         road = beyond(numbers, int(numbers[ROAD]) + 2 * tyres * min(max(row, 0), int(numbers[ROWS]) - 1))
         bodies = beyond(numbers, HEADER)
         points = beyond(bodies, PER_BODY * count)
-        parts = Parts(count, bodies, points, elements, beyond(points, PER_POINT * int(numbers[POINTS])))
-        work = Workspace(
+        parts = ForceLayout(count, bodies, points, elements, beyond(points, PER_POINT * int(numbers[POINTS])))
+        work = CallbackWorkspace(
             doubles(OF_BODY * count), doubles(OF_ELEMENT * elements), doubles(OF_POINT * int(numbers[POINTS]))
         )
         for i in range(OF_ELEMENT * elements):
@@ -272,15 +271,15 @@ def spatial_law() -> Any:
             array_at(data, xaxis),
         )
         forces = array_at(data, passive)
-        _move(parts, motion, work)
-        _act(parts, road, tyres, motion, work.elements, forces)
-        _press(parts, motion, work, forces)
+        _compute_twists_and_travels(parts, motion, work)
+        _add_element_forces(parts, road, tyres, motion, work.elements, forces)
+        _transfer_forces_to_joints(parts, motion, work, forces)
 
     return law
 
 
 @dataclass(frozen=True)
-class Element:
+class ForceElement:
     """A force F along a travel s = added coordinate + sum of axis . point - value at rest, less the road's height under
     its tyre.
 
@@ -301,28 +300,28 @@ class Element:
     one_sided: bool = False
 
 
-def force_elements(vehicle: SpatialVehicle, speed: float | None) -> list[Element]:
+def force_elements(vehicle: SpatialVehicle, speed: float | None) -> list[ForceElement]:
     """All force elements of a vehicle: springs, anti-roll bars, tyres, side forces and drags."""
-    held, v, acting = preloads(vehicle), float(speed or 0.0), list[Element]()
+    held, v, acting = static_preloads(vehicle), float(speed or 0.0), list[ForceElement]()
     for s in vehicle.springs:
         points = ((s.second_body, s.second_point, s.axis), (s.first_body, s.first_point, _scaled(s.axis, -1.0)))
         law = (s.stiffness, s.damping, held.parts[s.name], (s.friction, s.friction_rate))
-        acting.append(Element(points, *law, on_travel=s.travel_force, on_rate=s.rate_force))
+        acting.append(ForceElement(points, *law, on_travel=s.travel_force, on_rate=s.rate_force))
     for bar in vehicle.bars:
         down, up = (_scaled(UP, sign / bar.track) for sign in (-1.0, 1.0))
         points = ((bar.left, bar.point_left, down), (bar.right, bar.point_right, up))
         acting.append(
-            Element(points, bar.stiffness, bar.damping, held.parts[bar.name], added_coordinate=(bar.body, "rx"))
+            ForceElement(points, bar.stiffness, bar.damping, held.parts[bar.name], added_coordinate=(bar.body, "rx"))
         )
     for i, tyre in enumerate(vehicle.tyres):
         gains = (tyre.stiffness, tyre.damping, -held.tyres[tyre.name])
-        acting.append(Element(((tyre.body, tyre.point, UP),), *gains, tyre=i, one_sided=tyre.pushes_only))
+        acting.append(ForceElement(((tyre.body, tyre.point, UP),), *gains, tyre=i, one_sided=tyre.pushes_only))
     for f in vehicle.side_forces:
         steered = (((f.chassis, "rx"), -f.stiffness * f.roll_steer), ((f.chassis, "rz"), -f.stiffness))
-        acting.append(Element(((f.body, f.point, (0.0, 1.0, 0.0)),), damping=f.stiffness / v, steered=steered))
+        acting.append(ForceElement(((f.body, f.point, (0.0, 1.0, 0.0)),), damping=f.stiffness / v, steered=steered))
     for drag in vehicle.drags:
         centre = vehicle.body(drag.body).position
-        acting.append(Element(((drag.body, centre, (1.0, 0.0, 0.0)),), damping=drag.coefficient * v))
+        acting.append(ForceElement(((drag.body, centre, (1.0, 0.0, 0.0)),), damping=drag.coefficient * v))
     return acting
 
 
@@ -332,7 +331,7 @@ def _scaled(axis: Vector, factor: float) -> Vector:
 
 
 def packed_numbers(
-    vehicle: SpatialVehicle, elements: list[Element], mujoco_model: mujoco.MjModel, mujoco_indices: MujocoIndices
+    vehicle: SpatialVehicle, elements: list[ForceElement], mujoco_model: mujoco.MjModel, mujoco_indices: MujocoIndices
 ) -> tuple[tuple[int, int, int], list[float]]:
     """Counts of bodies, elements and points, and the list of all their numbers in the callback's table."""
     carrying = {name for body in vehicle.bodies if vehicle.turns(body.name) for name in vehicle.chain(body.name)}
@@ -347,21 +346,17 @@ def packed_numbers(
 
 
 def _body_numbers(
-    vehicle: SpatialVehicle,
-    body_name: str,
-    listed_bodies: list[str],
-    mujoco_model: mujoco.MjModel,
-    mujoco_indices: MujocoIndices,
+    vehicle: SpatialVehicle, body_name: str, bodies: list[str], mujoco_model: mujoco.MjModel, indices: MujocoIndices
 ) -> list[float]:
     """Numbers, in the callback's table, of a body that may turn, or that carries one that may."""
-    body, number = vehicle.body(body_name), mujoco_indices.bodies[body_name]
+    body, number = vehicle.body(body_name), indices.bodies[body_name]
     first, count = max(int(mujoco_model.body_jntadr[number]), 0), len(body.freedoms)
     sliding = sum(not freedom.startswith("r") for freedom in body.freedoms)
-    parent = listed_bodies.index(body.parent) if body.parent else -1
+    parent = bodies.index(body.parent) if body.parent else -1
     return [parent, number, first, first + sliding, first + count]
 
 
-def _points_of(elements: list[Element], vehicle: SpatialVehicle, body_name: str) -> list[list[float]]:
+def _points_of(elements: list[ForceElement], vehicle: SpatialVehicle, body_name: str) -> list[list[float]]:
     """Numbers, in the callback's table, of the points at which elements act on a body that may turn."""
     centre = vehicle.body(body_name).position
     return [
@@ -372,7 +367,7 @@ def _points_of(elements: list[Element], vehicle: SpatialVehicle, body_name: str)
     ]
 
 
-def _element_numbers(element: Element, vehicle: SpatialVehicle, mujoco_indices: MujocoIndices) -> list[float]:
+def _element_numbers(element: ForceElement, vehicle: SpatialVehicle, mujoco_indices: MujocoIndices) -> list[float]:
     """Numbers of an element in the callback's table: its linear law, the factors of coordinates in its travel, and the
     nonlinear terms of its law."""
     shares, rest = dict[int, float](), 0.0
@@ -392,7 +387,7 @@ def _element_numbers(element: Element, vehicle: SpatialVehicle, mujoco_indices: 
     return [begins + len(more), *law, begins if more else 0, *flat, *more]
 
 
-def _nonlinear_numbers(element: Element, mujoco_indices: MujocoIndices) -> list[float]:
+def _nonlinear_numbers(element: ForceElement, mujoco_indices: MujocoIndices) -> list[float]:
     """Numbers of the nonlinear terms of an element's law in the callback's table; none where the law is linear."""
     steered = [value for place, gain in element.steered for value in (mujoco_indices.joints.get(place, -1), gain)]
     curves = [element.on_travel, element.on_rate]

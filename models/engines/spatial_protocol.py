@@ -14,17 +14,17 @@ from typing import Protocol
 import numpy as np
 
 from models.core.errors import InputError, Refused
-from models.core.steps import divides, dividing_step
+from models.core.steps import dividing_step, step_divides
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.model import Model
-from models.engines.protocol import guard
+from models.engines.protocol import check_trajectory
 from models.engines.stability import ALLOWED_GROWTH, log_growth, longest_stable_step
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle, Vector
-from models.vehicles.spatial_linear import linearise, outputs, wheels
+from models.vehicles.spatial_linear import linear_outputs, linearise, wheels
 
 INTEGRATORS = {"exudyn": "RK44", "mujoco": "RK4"}
 """Name of the classical Runge-Kutta method in each engine."""
@@ -127,7 +127,7 @@ def _check_run(
 def check_divides(engine: str, run_settings: Settings) -> None:
     """Raise Refused for a step that does not divide the duration."""
     step, duration = run_settings.step, run_settings.duration
-    if not divides(step, duration):
+    if not step_divides(step, duration):
         raise Refused(
             engine,
             f"the step {step:g} s does not divide the duration {duration:g} s; use for "
@@ -221,7 +221,7 @@ def linear_vehicle(
         by_rate,
         vehicle.coordinates(),
         wheels(vehicle),
-        outputs(vehicle, kinematics),
+        linear_outputs(vehicle, kinematics),
         source,
     )
 
@@ -259,6 +259,6 @@ def checked_trajectory(
     engine_note: str,
     run_counts: dict[str, int],
 ) -> Trajectory:
-    """The trajectory of a run, after the checks of ``guard``; raises RunFailed."""
-    guard(engine, times, states, run_settings.duration, engine_note)
+    """The trajectory of a run, after the checks of ``check_trajectory``; raises RunFailed."""
+    check_trajectory(engine, times, states, run_settings.duration, engine_note)
     return Trajectory(times, states, counts=run_counts)

@@ -11,7 +11,7 @@ import numpy as np
 
 from models.vehicles.kinematics import UNIT_AXES, SpringEnd
 from models.vehicles.spatial import FREEDOMS, AntiRollBar, SpatialVehicle, SpringDamper, Vector
-from models.vehicles.spatial_linear import preloads
+from models.vehicles.spatial_linear import static_preloads
 
 
 @dataclass
@@ -55,7 +55,7 @@ class SpatialReference:
     """Hand-written equations of motion of a spatial vehicle, without an engine."""
 
     def __init__(self, vehicle: SpatialVehicle, speed: float | None = None) -> None:
-        self.vehicle, self.speed, self.held = vehicle, float(speed or 0.0), preloads(vehicle)
+        self.vehicle, self.speed, self.held = vehicle, float(speed or 0.0), static_preloads(vehicle)
         self.index = {place: i for i, place in enumerate(vehicle.coordinates())}
         self.size = len(self.index)
 

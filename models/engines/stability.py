@@ -19,7 +19,7 @@ import numpy as np
 
 from models.core.errors import Refused
 from models.engines.assembly import Assembly, Settings
-from models.vehicles.description import Vehicle, matrices
+from models.vehicles.description import PlaneVehicle, mass_damping_stiffness
 
 LinearMatrices = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 """Matrices (n, n) of a linear vehicle: mass, damping, stiffness, the damping that the engine knows (without callbacks),
@@ -50,13 +50,13 @@ def stability_polynomial(integrator: str) -> list[float] | None:
     return None
 
 
-def linearised(vehicle: Vehicle, prescribed_coordinates: Collection[int] = ()) -> LinearMatrices:
+def linearised_matrices(vehicle: PlaneVehicle, prescribed_coordinates: Collection[int] = ()) -> LinearMatrices:
     """The vehicle's matrices about zero pitch, without the ``prescribed_coordinates`` coordinates: pitch springs as
     beyond their dead bands, and tyres on the road."""
     known = replace(vehicle, struts=tuple(strut for strut in vehicle.struts if not strut.pushes_only))
     taut = tuple(replace(spring, dead_band=0.0) for spring in vehicle.pitch_springs)
-    mass, damping, stiffness = matrices(replace(vehicle, pitch_springs=taut))
-    native, joint = matrices(known)[1], matrices(replace(known, struts=known.tyres))[1]
+    mass, damping, stiffness = mass_damping_stiffness(replace(vehicle, pitch_springs=taut))
+    native, joint = mass_damping_stiffness(known)[1], mass_damping_stiffness(replace(known, struts=known.tyres))[1]
     kept = [i for i in range(len(mass)) if i not in prescribed_coordinates]
     pick = np.ix_(kept, kept)
     return mass[pick], damping[pick], stiffness[pick], native[pick], joint[pick]
@@ -147,7 +147,7 @@ def longest_stable_step(
 def check_step(engine: str, assembly: Assembly, run_settings: Settings) -> None:
     """Raise Refused for a step with which a mode of the vehicle would grow; the message gives the limit and the fastest
     pole."""
-    linear = linearised(assembly.vehicle, assembly.guided)
+    linear = linearised_matrices(assembly.vehicle, assembly.guided)
     grown = log_growth(run_settings.integrator, run_settings.step, run_settings.duration, linear)
     if grown <= math.log(ALLOWED_GROWTH):
         return

@@ -6,11 +6,11 @@ springs acts along axes that only yaw: no element of an engine has that.
 
 import numpy as np
 
-from models.engines.native_parts import Division, divide
+from models.engines.native_parts import ElementDivision, divide_between_engine_and_callback
 from models.multibody import forces as at
 from models.multibody import parts
 from models.multibody.numbers import Handling
-from models.vehicles.cut_vehicle import Element, elements_of
+from models.vehicles.cut_vehicle import CutVehicleElement, elements_of
 from models.vehicles.spatial import AntiRollBar, SpringDamper
 
 FORCE_COLUMNS = [parts.STIFFNESS, parts.DAMPING, parts.HELD, parts.FRICTION, parts.ON_TRAVEL, parts.ON_RATE]
@@ -18,14 +18,16 @@ FORCE_COLUMNS = [parts.STIFFNESS, parts.DAMPING, parts.HELD, parts.FRICTION, par
 curves); all are 0 if the engine itself computes the part."""
 
 
-def towed_division(vehicle_on_tyres: Handling, engine: str) -> Division:
+def towed_division(vehicle_on_tyres: Handling, engine: str) -> ElementDivision:
     """Division of the springs and bars of towed bodies between "exudyn" or "mujoco" and the compiled forces."""
     free = vehicle_on_tyres.vehicle
     elements = elements_of(free, vehicle_on_tyres.held) if vehicle_on_tyres.forces == "native" and free.towed else ()
-    return divide(free, (element for element in elements if element.frame in free.towed), engine)
+    return divide_between_engine_and_callback(
+        free, (element for element in elements if element.frame in free.towed), engine
+    )
 
 
-def shared_numbers(vehicle_on_tyres: Handling, division: Division) -> np.ndarray:
+def shared_numbers(vehicle_on_tyres: Handling, division: ElementDivision) -> np.ndarray:
     """The table for the compiled forces, without the terms that native parts compute; the vehicle's own table where
     there are no native parts."""
     if not division.native:
@@ -46,7 +48,7 @@ def shared_numbers(vehicle_on_tyres: Handling, division: Division) -> np.ndarray
     return numbers
 
 
-def _remainder(element_row: np.ndarray, shared_element: Element | None) -> None:
+def _remainder(element_row: np.ndarray, shared_element: CutVehicleElement | None) -> None:
     """Reduce a part's row of the table to the terms that are not native; to zeros where the part is entirely native."""
     gone = (
         shared_element is None or shared_element.travel_force is None,

@@ -12,7 +12,7 @@ import numpy as np
 
 from models.contact.inputs import Array
 from models.core.errors import RunFailed
-from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.free_vehicle import FreeModel, LoadedVehicle, free_model
 from models.engines.native_parts import GroundSpring
 from models.rail.equations import DERAILED_LIMIT, ROLL, YAW, WheelsetEquations, Y, Z
 from models.rail.joint_forces import (
@@ -30,7 +30,7 @@ from models.vehicles.spatial import Body, SpatialVehicle
 CENTRE = (0.0, 0.0, 0.0)
 
 
-def driven_wheelset(wheelset_equations: WheelsetEquations) -> Driven:
+def driven_wheelset(wheelset_equations: WheelsetEquations) -> LoadedVehicle:
     """The wheelset as engines build it: bodies in the order of the joints, the suspension at both ends, and the table
     of numbers for the forces of the rails."""
     body = wheelset_equations.body
@@ -55,7 +55,7 @@ def driven_wheelset(wheelset_equations: WheelsetEquations) -> Driven:
     )
     numbers = joint_force_table(float(wheelset_equations.speed), wheelset_equations.rails)
     vehicle = SpatialVehicle("wheelset", bodies, (), (), ())
-    return Driven(vehicle, GRAVITY * track, numbers, joint_forces, set_joint_forces, ground_springs=springs)
+    return LoadedVehicle(vehicle, GRAVITY * track, numbers, joint_forces, set_joint_forces, ground_springs=springs)
 
 
 class EngineWheelset(WheelsetEquations):

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from models.core.errors import InputError
 from models.ensemble.store import checksum_of_sources, named_files
-from models.machine.left_out import let_in
+from models.machine.left_out import show_libraries
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
 """Options of glibc's mallopt, from its malloc.h."""
@@ -185,7 +185,7 @@ def dask_workers(scheduler_address: str, *used_paths: Path) -> Iterator[Executor
     ``cluster`` is not installed, nobody answers, no worker has joined, or one cannot compute the same: with other
     sources, with several threads (engines share their callbacks within a process), or without sight of ``used_paths``.
     """
-    let_in("dask")
+    show_libraries("dask")
     try:
         from distributed import Client
     except ImportError:

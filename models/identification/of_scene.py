@@ -13,7 +13,7 @@ from models.core.errors import InputError, RunFailed, suggestion_phrase
 from models.core.result import Result
 from models.core.scene_file import set_key
 from models.core.strict import LARGEST_QUANTITY
-from models.core.systems import SYSTEMS, of_table
+from models.core.systems import SYSTEMS, scene_of_table
 from models.identification.problem import (
     ChannelOnClock,
     FitClock,
@@ -132,7 +132,7 @@ class SceneModel:
         table = copy.deepcopy(self.table)
         for key, value in zip(self.keys, parameter_values, strict=True):
             set_key(table, key, float(value))
-        return of_table(table, self.file, self.folder)
+        return scene_of_table(table, self.file, self.folder)
 
     def result(self, parameter_values: np.ndarray) -> Result:
         """Result of the run of the scene with the given parameter values (p,)."""
@@ -173,7 +173,7 @@ def _check_channel_names(scene: Any, measurement_path: str | Path, engine: str) 
         return
     set_key(table, "run.duration", duration / TRIAL_RUN_SHARE)
     try:
-        short = of_table(table, scene.file, Path(scene.folder))
+        short = scene_of_table(table, scene.file, Path(scene.folder))
         names = channels_over_time(import_module(f"{SYSTEMS[scene.system].package}.run").run(short, engine))
     except (InputError, RunFailed):
         return

@@ -79,7 +79,7 @@ def _compile_alone(function_cache: Any, function: Callable, compile_function: Ca
         return compile_function
     stem = file._index_name.removesuffix(".nbi")
     file._data_name = lambda number: f"{stem}.{uuid4().hex[:12]}.nbc"
-    file._source_stamp = stamp(*_files(function))
+    file._source_stamp = source_checksum(*_compiled_source_files(function))
     file._load_index = _or_none(file._load_index)
     lock = KernelLock(Path(function_cache.cache_path) / f"{stem}.lock")
     load_after_others(function_cache, lock)
@@ -129,7 +129,7 @@ def _or_none(load_index: Callable[[], dict]) -> Callable[[], dict]:
     return read
 
 
-def named_closure(closure: Any, *name_parts: Any) -> Any:
+def closure_with_unique_name(closure: Any, *name_parts: Any) -> Any:
     """The closure, renamed after ``name_parts`` so that its name is unique among its factory's closures; must be done
     before compiling."""
     closure.__qualname__ = closure.__name__ = "_".join([closure.__name__, *(str(part) for part in name_parts)])
@@ -137,7 +137,7 @@ def named_closure(closure: Any, *name_parts: Any) -> Any:
 
 
 @cache
-def checksum(source_folder: Path) -> int:
+def folder_checksum(source_folder: Path) -> int:
     """Checksum of all sources in a folder and in the folders that all kernels share, with the tables beside them:
     whatever a kernel of this folder may contain."""
     sources = (
@@ -146,33 +146,33 @@ def checksum(source_folder: Path) -> int:
     return zlib.crc32(b"".join(path.read_bytes() for path in sources))
 
 
-def _files(function: Any) -> list[Path]:
+def _compiled_source_files(function: Any) -> list[Path]:
     """Source files of a function and of the compiled functions among its globals."""
     called = [function.__globals__.get(name) for name in function.__code__.co_names]
     functions = [function, *(each.py_func for each in called if hasattr(each, "py_func"))]
     return [Path(each.__code__.co_filename) for each in functions]
 
 
-def stamp(kernel_file: Path, *called_kernels: Path) -> int:
+def source_checksum(kernel_file: Path, *called_kernels: Path) -> int:
     """Checksum of all sources that a kernel in ``kernel_file`` may contain: the sources of its folder, and the kernels
     of ``called_kernels`` and of all files that these import."""
     made_of = {*called_kernels, *(path for each in (kernel_file, *called_kernels) for path in _imported(each))}
     elsewhere = sorted(path for path in made_of if path.parent not in (kernel_file.parent, *COMMON))
-    return zlib.crc32(b"".join(path.read_bytes() for path in elsewhere), checksum(kernel_file.parent))
+    return zlib.crc32(b"".join(path.read_bytes() for path in elsewhere), folder_checksum(kernel_file.parent))
 
 
 def _imported(source_file: Path) -> set[Path]:
     """Files with compiled kernels that a file imports, directly or through other such files."""
     imported, left = set[Path](), [source_file]
     while left:
-        new = _kernels(left.pop()) - imported
+        new = _imported_kernel_files(left.pop()) - imported
         imported |= new
         left += new
     return imported
 
 
 @cache
-def _kernels(source_file: Path) -> frozenset[Path]:
+def _imported_kernel_files(source_file: Path) -> frozenset[Path]:
     """Files with compiled kernels that a file's import statements name; read from the text, without importing."""
     if not source_file.is_file():
         return frozenset()

@@ -14,8 +14,8 @@ SEEKER = "xarray"
 import."""
 
 
-def leave_out(*library_names: str) -> None:
-    """Make optional libraries appear as not installed in this process, until ``let_in`` is called.
+def hide_libraries(*library_names: str) -> None:
+    """Make optional libraries appear as not installed in this process, until ``show_libraries`` is called.
 
     Those that are imported already stay, and all stay where xarray is: it may count on them.
     """
@@ -25,8 +25,8 @@ def leave_out(*library_names: str) -> None:
             modules.setdefault(name, None)
 
 
-def let_in(*library_names: str) -> None:
-    """Undo ``leave_out`` for these libraries; must be called before one of them is imported."""
+def show_libraries(*library_names: str) -> None:
+    """Undo ``hide_libraries`` for these libraries; must be called before one of them is imported."""
     modules: dict[str, Any] = sys.modules
     for name in library_names:
         if name in modules and modules[name] is None:

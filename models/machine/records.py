@@ -29,7 +29,7 @@ def size_of(record_type: np.dtype) -> int:
 
 
 @_intrinsic
-def records(typing_context, pointer, count, kind):
+def records_at_pointer(typing_context, pointer, count, kind):
     """Array (count,) of records of a type that begins at a pointer to doubles, whose memory must outlive the array."""
     made: Any = types.Array(kind.dtype, 1, "C")
 
@@ -40,7 +40,7 @@ def records(typing_context, pointer, count, kind):
 
 
 @_intrinsic(prefer_literal=True)
-def stacked(typing_context, count, kind):
+def stack_records(typing_context, count, kind):
     """Array (count,) of records on the stack, valid until the calling function returns; its initial contents are
     arbitrary.
 

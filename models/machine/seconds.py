@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 
-def duration(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
     """Text of a time (s) in a suitable unit."""
     for factor, unit in ((1.0, "s"), (1e3, "ms")):
         if factor * seconds >= 1.0:
@@ -14,10 +14,10 @@ def duration(seconds: float) -> str:
     return f"{1e6 * seconds:.3g} us"
 
 
-def cost(seconds: Sequence[float] | np.ndarray) -> str:
+def seconds_text(seconds: Sequence[float] | np.ndarray) -> str:
     """Text on the computing times (s) of repeated runs: "12 ms (11 ms to 15 ms)", or "12 ms once"."""
     values = np.asarray(seconds, float)
-    middle = duration(float(np.median(values)))
+    middle = duration_text(float(np.median(values)))
     if values.size == 1:
         return f"{middle} once"
-    return f"{middle} ({duration(float(values.min()))} to {duration(float(values.max()))})"
+    return f"{middle} ({duration_text(float(values.min()))} to {duration_text(float(values.max()))})"

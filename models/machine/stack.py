@@ -93,7 +93,7 @@ def at(typing_context, address):
 
 
 @_intrinsic
-def ask(typing_context, address, inputs, table, outputs):
+def call_at_address(typing_context, address, inputs, table, outputs):
     """Result of calling the compiled function int32(DOUBLES, DOUBLES, DOUBLES) at an address that is given as a whole
     number."""
 

@@ -72,35 +72,35 @@ def _timed(timed_job: Callable[[], Any], repeat_count: int, clock: Clock) -> flo
     return (clock() - start) / repeat_count
 
 
-def describe(seconds: Sequence[float]) -> dict[str, float]:
+def timing_statistics(seconds: Sequence[float]) -> dict[str, float]:
     """Median, median absolute deviation and minimum of timed samples (s), by name."""
     values = np.asarray(seconds)
     middle = float(np.median(values))
     return {"median": middle, "mad": float(np.median(np.abs(values - middle))), "min": float(values.min())}
 
 
-def interval(bootstrapped_values: np.ndarray) -> tuple[float, float, float]:
+def bootstrap_interval(bootstrapped_values: np.ndarray) -> tuple[float, float, float]:
     """Median and 95 % interval (2.5 % and 97.5 % quantile) of bootstrapped values."""
     low, middle, high = np.quantile(bootstrapped_values, (0.025, 0.5, 0.975))
     return float(middle), float(low), float(high)
 
 
-def resamples(round_count: int, resample_count: int = RESAMPLES) -> np.ndarray:
+def bootstrap_rounds(round_count: int, resample_count: int = RESAMPLES) -> np.ndarray:
     """Numbers of rounds drawn with replacement, shape (count, rounds); the same draw for all jobs keeps paired times
     together."""
     return np.random.default_rng(SEED).integers(round_count, size=(resample_count, round_count))
 
 
-def median(timed_samples: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
+def bootstrap_median(timed_samples: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
     """Median of the samples of all rounds with its bootstrap 95 % interval."""
     values = np.asarray(timed_samples, float)
-    _, low, high = interval(np.median(values[resamples(len(values))], axis=1))
+    _, low, high = bootstrap_interval(np.median(values[bootstrap_rounds(len(values))], axis=1))
     return float(np.median(values)), low, high
 
 
-def spelled(timed_samples: Sequence[float] | np.ndarray, scale: float = 1.0) -> str:
+def interval_text(timed_samples: Sequence[float] | np.ndarray, scale: float = 1.0) -> str:
     """Text of the samples' median with its interval, as used in tables: "12.3 (11.9 to 12.8)"."""
-    middle, low, high = (f"{scale * value:.3g}" for value in median(timed_samples))
+    middle, low, high = (f"{scale * value:.3g}" for value in bootstrap_median(timed_samples))
     return f"{middle} ({low} to {high})"
 
 
@@ -110,5 +110,5 @@ def paired_ratio(
     """Ratio a / b of paired times, by the median of the log ratios within the rounds, with its bootstrap 95 %
     interval."""
     logs = np.log(np.asarray(numerator_times) / np.asarray(denominator_times))
-    _, low, high = interval(np.median(logs[resamples(len(logs))], axis=1))
+    _, low, high = bootstrap_interval(np.median(logs[bootstrap_rounds(len(logs))], axis=1))
     return math.exp(float(np.median(logs))), math.exp(low), math.exp(high)

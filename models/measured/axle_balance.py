@@ -17,7 +17,7 @@ from models.drift.growth import RigidPitch, rigid_pitch
 from models.measured.ratios import NEGLIGIBLE_MEAN_LOAD_SHARE, WrongFactor
 from models.measured.recording import Recording
 from models.measured.signal import MeasuredSignal
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 LOCATIONS_OF_AXLE_FORCES = {
     "front": ("front", "front left", "front right"),
@@ -59,7 +59,7 @@ class AxleForces:
 
     forces: np.ndarray
     period: float
-    parameters: Parameters
+    parameters: PitchPlaneParameters
     signals: tuple[tuple[MeasuredSignal, ...], tuple[MeasuredSignal, ...]]
     duration: float
     remedies: Mapping[WrongFactor, str] | None = None
@@ -146,7 +146,7 @@ def axle_signals(recording: Recording, axle_name: str) -> list[MeasuredSignal]:
     return whole or vertical
 
 
-def axle_forces_of(recording: Recording, vehicle_parameters: Parameters) -> AxleForces | None:
+def axle_forces_of(recording: Recording, vehicle_parameters: PitchPlaneParameters) -> AxleForces | None:
     """``AxleForces`` of a recording, gaps bridged by straight lines; None where an axle lacks a wheel's signal."""
     signals = tuple(tuple(axle_signals(recording, axle)) for axle in LOCATIONS_OF_AXLE_FORCES)
     if not all(
@@ -264,7 +264,7 @@ def _block_means(samples: np.ndarray) -> np.ndarray:
     return np.array([block.mean(axis=0) for block in blocks])
 
 
-def _axle_masses(parameters: Parameters) -> np.ndarray:
+def _axle_masses(parameters: PitchPlaneParameters) -> np.ndarray:
     """Mass (2,) in kg carried by each axle, wheels included."""
     return np.array(
         [

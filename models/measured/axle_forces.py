@@ -6,7 +6,7 @@ Both kinds of input go through here: a file of wheel forces of a pitch-plane sce
 
 import numpy as np
 
-from models.core.finding import Finding, Weight
+from models.core.finding import Finding, FindingWeight
 from models.core.time_series import sparse_record_warning
 from models.measured.axle_balance import (
     GRAVITY,
@@ -186,7 +186,7 @@ def _imbalance_findings(axle_forces: AxleForces) -> list[Finding]:
     beyond = (
         np.abs(motion.shares_of_load) > LARGE_IMBALANCE_SHARE + motion.uncertainties / motion.whole_load_accelerations
     )
-    weight: Weight = "error" if (beyond & _travels_too_far(axle_forces, motion)).any() else "doubt"
+    weight: FindingWeight = "error" if (beyond & _travels_too_far(axle_forces, motion)).any() else "doubt"
     excess = np.linalg.solve(
         axle_forces.accelerations_per_newton, np.where(motion.is_beyond_uncertainty, motion.accelerations, 0.0)
     )

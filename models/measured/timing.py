@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.finding import Finding, Weight
+from models.core.finding import Finding, FindingWeight
 
 LEAST_GAP_PERIODS = 1.5
 """Distance of two samples, in periods, above which there is a gap between them."""
@@ -32,7 +32,7 @@ REPEATED_TIME_SHARE = 0.01
 """Share of the samples that may repeat the time of another one: dropping them then does no harm."""
 
 
-ReportFinding = Callable[[str, Weight, str, float, str, Iterable[float]], None]
+ReportFinding = Callable[[str, FindingWeight, str, float, str, Iterable[float]], None]
 """Function that records a finding: check, severity, text, size, unit and times."""
 
 
@@ -96,7 +96,7 @@ def _timing_of_valid_times(times: np.ndarray, measurement_place: str, signal_nam
     findings, sample_count = list[Finding](), len(times)
 
     def report(
-        check: str, severity: Weight, finding_text: str, finding_size: float, unit: str, times: Iterable[float]
+        check: str, severity: FindingWeight, finding_text: str, finding_size: float, unit: str, times: Iterable[float]
     ) -> None:
         findings.append(
             Finding(
@@ -255,7 +255,7 @@ def _report_jitter(times: np.ndarray, sampling_period: float, report_finding: Re
     deviations = steps[steps <= LEAST_GAP_PERIODS * sampling_period] - sampling_period
     spread = float(deviations.std())
     if spread > EVEN_CLOCK_DEVIATION_SHARE * sampling_period:
-        weight: Weight = "doubt" if spread > JITTER_SHARE * sampling_period else "note"
+        weight: FindingWeight = "doubt" if spread > JITTER_SHARE * sampling_period else "note"
         report_finding(
             "jitter",
             weight,

@@ -5,7 +5,7 @@ from functools import cache
 from typing import Any
 
 from models.core.errors import InputError, suggestion_phrase
-from models.machine.left_out import let_in
+from models.machine.left_out import show_libraries
 from models.measured.signal import UNIT_OF_QUANTITY, Quantity
 
 UNIT_SPELLINGS = {
@@ -122,7 +122,7 @@ def quantities_of_unit(unit: str) -> tuple[Quantity, ...]:
 @cache
 def _unit_registry() -> Any:
     """pint's registry of units, created once."""
-    let_in("pint")
+    show_libraries("pint")
     import pint
 
     return pint.UnitRegistry()

@@ -23,14 +23,14 @@ from models.multibody.cut_mechanics import (
     add_inertia,
     add_wrench,
     joint_velocity,
-    locate,
-    move,
-    rotated,
-    solve,
+    move_bodies,
+    point_position,
+    rotated_vector,
+    solve_in_place,
 )
-from models.multibody.parts import on_curve
-from models.multibody.tree import cross, dot, plus, put, three, times
-from models.multibody.tree import out as into
+from models.multibody.parts import curve_force
+from models.multibody.tree import cross, dot, plus, put_three, three_from, times
+from models.multibody.tree import vector_in_carrier_axes as into
 from models.vehicles.cut_vehicle import HEADING, PITCH, ROLL
 
 (
@@ -118,14 +118,14 @@ def _element_force(element_row, parameter_table, joint_motion, chassis_joint, tr
     respect to the joint coordinates behind the chassis."""
     joints, links = joint_motion.joints, joint_motion.links
     axis, travel, rate = (
-        rotated(links[int(element_row[AXIS_JOINT]) + 1], three(element_row, AXIS)),
+        rotated_vector(links[int(element_row[AXIS_JOINT]) + 1], three_from(element_row, AXIS)),
         -element_row[DESIGN_TRAVEL],
         0.0,
     )
     travel_gradient[:] = 0.0
     for side in range(2):
         sign, j = 2.0 * side - 1.0, int(element_row[SECOND_BODY * side])
-        end = locate(links[j + 1], element_row, SECOND_BODY * side + 1)
+        end = point_position(links[j + 1], element_row, SECOND_BODY * side + 1)
         for k in range(3):
             travel += sign * axis[k] * end[k]
         while j > chassis_joint:
@@ -139,9 +139,9 @@ def _element_force(element_row, parameter_table, joint_motion, chassis_joint, tr
     if element_row[FRICTION] != 0.0:
         force += element_row[FRICTION] * math.tanh(rate / element_row[FRICTION_RATE])
     if element_row[TRAVEL_CURVE] != 0.0:
-        force += on_curve(beyond(start(parameter_table), int(element_row[TRAVEL_CURVE])), travel)
+        force += curve_force(beyond(start(parameter_table), int(element_row[TRAVEL_CURVE])), travel)
     if element_row[RATE_CURVE] != 0.0:
-        force += on_curve(beyond(start(parameter_table), int(element_row[RATE_CURVE])), rate)
+        force += curve_force(beyond(start(parameter_table), int(element_row[RATE_CURVE])), rate)
     return force
 
 
@@ -168,8 +168,8 @@ def _read_inputs(table_head, input_table, t, input_row):
 def span_vector(element_row, body_motions):
     """Vector (m, in space) from the first to the second attachment point of a spring, mount or bar."""
     return plus(
-        locate(body_motions[int(element_row[SECOND_BODY]) + 1], element_row, SECOND_POINT),
-        times(locate(body_motions[int(element_row[FIRST_BODY]) + 1], element_row, FIRST_POINT), -1.0),
+        point_position(body_motions[int(element_row[SECOND_BODY]) + 1], element_row, SECOND_POINT),
+        times(point_position(body_motions[int(element_row[FIRST_BODY]) + 1], element_row, FIRST_POINT), -1.0),
     )
 
 
@@ -180,7 +180,7 @@ def _add_axis_rotation(element_row, joint_motion, chassis_joint, axis, travel_gr
     joints, links = joint_motion.joints, joint_motion.links
     moved, rate, j = cross(axis, span_vector(element_row, links)), 0.0, int(element_row[AXIS_JOINT])
     while j > chassis_joint:
-        along = joints[j, ROTATES] * dot(moved, three(links[j + 1], JOINT_AXIS))
+        along = joints[j, ROTATES] * dot(moved, three_from(links[j + 1], JOINT_AXIS))
         travel_gradient[j] += along
         rate += along * joint_motion.v[j]
         j = int(joints[j, PARENT])
@@ -196,7 +196,8 @@ def _tyre_wrench(hub_row, joint_motion, hub_position, road_height_and_rate, spee
     """
     height, rate = road_height_and_rate
     joints, links, v = joint_motion.joints, joint_motion.links, joint_motion.v
-    down, j, risen, sideways = rotated(links[ROLL + 1], (0.0, 0.0, -hub_row[HEIGHT])), int(hub_row[LAST]), 0.0, 0.0
+    down, j = rotated_vector(links[ROLL + 1], (0.0, 0.0, -hub_row[HEIGHT])), int(hub_row[LAST])
+    risen = sideways = 0.0
     point = plus(hub_position, down)
     while j >= 0:
         risen += joint_velocity(joints[j, ROTATES], links[j + 1], hub_position)[2] * v[j]
@@ -233,7 +234,7 @@ def _enforce_roll_and_pitch(table_head, wanted_roll_and_pitch, bodies, joint_mot
         sides[0, j] = generalised_forces[j]
     sides[1, ROLL] = sides[2, PITCH] = 1.0
     add_inertia(joint_motion.joints, bodies, joint_motion.links, table_head[GRAVITY], mass, sides[0])
-    solve(mass, sides)
+    solve_in_place(mass, sides)
     roll = (
         wanted_roll_and_pitch[4]
         + 2.0 * w * (wanted_roll_and_pitch[2] - v[ROLL])
@@ -290,22 +291,22 @@ def forces(parameter_table, t, q, v, body_motions, generalised_forces, force_rep
         force_report.moments,
     )
     travel = array(doubles(len(joints)), (len(joints),))
-    move(joints, q, v, body_motions)
+    move_bodies(joints, q, v, body_motions)
     for i in range(len(elements)):
         force_report.elements[i] = _element_force(elements[i], parameter_table, motion, chassis, travel)
         for j in range(chassis + 1, len(joints)):
             generalised_forces[j] -= force_report.elements[i] * travel[j]
     for i in range(count):
         hub, known, axes = hubs[i], force_report.wrenches[i], body_motions[wrench_axes_row(head, hubs[i])]
-        place = locate(body_motions[int(hub[LAST]) + 1], hub, ARM)
+        place = point_position(body_motions[int(hub[LAST]) + 1], hub, ARM)
         if head[ROAD] != 0.0:
             force, moment = _tyre_wrench(hub, motion, place, (row[i], row[count + i]), head[SPEED])
-            put(known, 0, into(axes, force, 0))
-            put(known, 3, into(axes, moment, 0))
+            put_three(known, 0, into(axes, force, 0))
+            put_three(known, 3, into(axes, moment, 0))
         else:
             for k in range(WRENCH):
                 known[k] = row[WRENCH * i + k]
-            force, moment = rotated(axes, three(known, 0)), rotated(axes, three(known, 3))
+            force, moment = rotated_vector(axes, three_from(known, 0)), rotated_vector(axes, three_from(known, 3))
         add_wrench(joints, body_motions, int(hub[LAST]), place, force, moment, generalised_forces)
     moments[0] = moments[1] = 0.0
     wanted = row[len(row) - GUIDE_COLUMNS :]
@@ -319,7 +320,7 @@ def forces(parameter_table, t, q, v, body_motions, generalised_forces, force_rep
 
 
 @njit(cache=True, error_model="numpy")
-def report(parameter_table, times, states, element_forces, wrenches, moments):
+def report_forces(parameter_table, times, states, element_forces, wrenches, moments):
     """Fill the arrays of a ``ForceReport`` for states (m, 2 n) at times (m,), one row per state."""
     n = states.shape[1] // 2
     links, out = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n), (n,))
@@ -342,7 +343,7 @@ def accelerate(parameter_table, t, q, v, accelerations):
     accelerations[:] = 0.0
     forces(parameter_table, t, q, v, links, accelerations, force_report)
     add_inertia(joints, bodies, links, head[GRAVITY], mass, accelerations)
-    solve(mass, array(start(accelerations), (1, n)))
+    solve_in_place(mass, array(start(accelerations), (1, n)))
 
 
 @njit(cache=True, error_model="numpy")

@@ -9,7 +9,7 @@ import math
 
 from models.machine.compiled import lean
 from models.machine.stack import array, doubles
-from models.multibody.tree import add, cross, dot, plus, put, three, times
+from models.multibody.tree import add_three, cross, dot, plus, put_three, three_from, times
 
 PARENT, ROTATES, AXIS, OFFSET, PER_JOINT = 0, 1, 2, 3, 6
 """Indices of the numbers of a joint: its parent joint (-1: the ground), whether it rotates, its axis, its position on
@@ -18,21 +18,21 @@ LAST, MASS, ARM, INERTIA, PER_BODY = 0, 1, 2, 5, 14
 """Indices of the numbers of a body: the joint that carries it, mass (kg), position of its centre (m) from that joint,
 inertia about its centre (kg m^2)."""
 ROTATION, POSITION, JOINT_AXIS, OMEGA, BIAS, ANGULAR_BIAS, PER_MOTION = 0, 9, 12, 15, 18, 21, 24
-"""Indices of the numbers in a row of ``links``: rotation matrix, first as ``rotated`` reads it there, position, joint
-axis, angular velocity, and linear and angular acceleration without the q'' terms."""
+"""Indices of the numbers in a row of ``links``: rotation matrix, first as ``rotated_vector`` reads it there, position,
+joint axis, angular velocity, and linear and angular acceleration without the q'' terms."""
 
 
 @lean
-def rotated(matrix, vector):
+def rotated_vector(matrix, vector):
     """Product of a matrix (3, 3) and a vector (3,); the matrix is the first nine numbers of ``matrix``, row by row.
 
     With a row of ``links`` it turns a vector from the body's axes to those of space.
     """
-    return dot(three(matrix, 0), vector), dot(three(matrix, 3), vector), dot(three(matrix, 6), vector)
+    return dot(three_from(matrix, 0), vector), dot(three_from(matrix, 3), vector), dot(three_from(matrix, 6), vector)
 
 
 @lean
-def move(joints, q, v, body_motions):
+def move_bodies(joints, q, v, body_motions):
     """Fill ``body_motions`` (n + 1, PER_MOTION) with the motion of the body behind each joint, from joint coordinates
     and rates (n,)."""
     body_motions[0, :] = 0.0
@@ -43,49 +43,49 @@ def move(joints, q, v, body_motions):
         for i in range(PER_MOTION):
             link[i] = below[i]
         arm, along, omega = (
-            rotated(below, three(joint, OFFSET)),
+            rotated_vector(below, three_from(joint, OFFSET)),
             (below[k], below[3 + k], below[6 + k]),
-            three(link, OMEGA),
+            three_from(link, OMEGA),
         )
         slides = joint[ROTATES] == 0.0
         if slides:
             arm = plus(arm, times(along, q[j]))
-        put(link, JOINT_AXIS, along)
-        add(link, POSITION, arm)
-        add(link, BIAS, cross(omega, cross(omega, arm)))
-        add(link, BIAS, cross(three(below, ANGULAR_BIAS), arm))
+        put_three(link, JOINT_AXIS, along)
+        add_three(link, POSITION, arm)
+        add_three(link, BIAS, cross(omega, cross(omega, arm)))
+        add_three(link, BIAS, cross(three_from(below, ANGULAR_BIAS), arm))
         if slides:
-            add(link, BIAS, times(cross(omega, along), 2.0 * v[j]))
+            add_three(link, BIAS, times(cross(omega, along), 2.0 * v[j]))
         else:
-            add(link, ANGULAR_BIAS, times(cross(omega, along), v[j]))
-            _turn(link, below, k, q[j], times(along, v[j]))
+            add_three(link, ANGULAR_BIAS, times(cross(omega, along), v[j]))
+            _rotate_body(link, below, k, q[j], times(along, v[j]))
 
 
 @lean
-def _turn(body_motion, parent_motion, axis_index, angle, angular_rate):
+def _rotate_body(body_motion, parent_motion, axis_index, angle, angular_rate):
     """Rotate the row ``body_motion`` of ``links`` about axis k of the row ``parent_motion`` by an angle (rad); add the
     angular velocity ``angular_rate`` (rad/s, a vector)."""
     c, s, a, b = math.cos(angle), math.sin(angle), (axis_index + 1) % 3, (axis_index + 2) % 3
-    add(body_motion, OMEGA, angular_rate)
+    add_three(body_motion, OMEGA, angular_rate)
     for i in range(0, 9, 3):
         body_motion[a + i] = c * parent_motion[a + i] + s * parent_motion[b + i]
         body_motion[b + i] = c * parent_motion[b + i] - s * parent_motion[a + i]
 
 
 @lean
-def locate(body_motion, numbers, arm_index):
+def point_position(body_motion, numbers, arm_index):
     """Position in space of a point given by its arm from the origin of a row of ``links``, in that row's axes."""
-    return plus(rotated(body_motion, three(numbers, arm_index)), three(body_motion, POSITION))
+    return plus(rotated_vector(body_motion, three_from(numbers, arm_index)), three_from(body_motion, POSITION))
 
 
 @lean
 def joint_velocity(is_rotation, body_motion, position):
     """Velocity of a point at ``position`` per unit rate of a joint below it; ``body_motion`` is the joint's row of
     ``links``."""
-    along = three(body_motion, JOINT_AXIS)
+    along = three_from(body_motion, JOINT_AXIS)
     if is_rotation == 0.0:
         return along
-    return plus(cross(along, position), times(cross(along, three(body_motion, POSITION)), -1.0))
+    return plus(cross(along, position), times(cross(along, three_from(body_motion, POSITION)), -1.0))
 
 
 @lean
@@ -95,7 +95,7 @@ def add_wrench(joints, body_motions, last_joint, position, force, moment, genera
     j = last_joint
     while j >= 0:
         link, turns = body_motions[j + 1], joints[j, ROTATES]
-        by, about = joint_velocity(turns, link, position), times(three(link, JOINT_AXIS), turns)
+        by, about = joint_velocity(turns, link, position), times(three_from(link, JOINT_AXIS), turns)
         for k in range(3):
             generalised_forces[j] += by[k] * force[k] + about[k] * moment[k]
         j = int(joints[j, PARENT])
@@ -105,8 +105,11 @@ def add_wrench(joints, body_motions, last_joint, position, force, moment, genera
 def bias_acceleration(body_motion, arm, gravity):
     """Acceleration of a body's point without the q'' terms, minus that of free fall; ``arm`` : from the origin of a row
     of ``links``."""
-    omega, rest = three(body_motion, OMEGA), (body_motion[BIAS], body_motion[BIAS + 1], body_motion[BIAS + 2] + gravity)
-    return plus(plus(rest, cross(omega, cross(omega, arm))), cross(three(body_motion, ANGULAR_BIAS), arm))
+    omega, rest = (
+        three_from(body_motion, OMEGA),
+        (body_motion[BIAS], body_motion[BIAS + 1], body_motion[BIAS + 2] + gravity),
+    )
+    return plus(plus(rest, cross(omega, cross(omega, arm))), cross(three_from(body_motion, ANGULAR_BIAS), arm))
 
 
 @lean
@@ -120,9 +123,10 @@ def body_inertia_terms(body_motion, body_row, gravity, inertia_tensor):
                 inertia_tensor[3 * i + j] += (
                     body_motion[3 * i + k // 3] * body_row[INERTIA + k] * body_motion[3 * j + k % 3]
                 )
-    arm, omega = rotated(body_motion, three(body_row, ARM)), three(body_motion, OMEGA)
+    arm, omega = rotated_vector(body_motion, three_from(body_row, ARM)), three_from(body_motion, OMEGA)
     momentum = plus(
-        rotated(inertia_tensor, three(body_motion, ANGULAR_BIAS)), cross(omega, rotated(inertia_tensor, omega))
+        rotated_vector(inertia_tensor, three_from(body_motion, ANGULAR_BIAS)),
+        cross(omega, rotated_vector(inertia_tensor, omega)),
     )
     return arm, bias_acceleration(body_motion, arm, gravity), momentum
 
@@ -138,16 +142,16 @@ def add_inertia(joints, bodies, body_motions, gravity, mass_matrix, generalised_
         body = bodies[b]
         j, kg, count = int(body[LAST]), body[MASS], 0
         arm, a, t = body_inertia_terms(body_motions[j + 1], body, gravity, tensor)
-        place = plus(arm, three(body_motions[j + 1], POSITION))
+        place = plus(arm, three_from(body_motions[j + 1], POSITION))
         while j >= 0:
             row, link, turns = rows[count], body_motions[j + 1], joints[j, ROTATES]
             chain[count] = j
-            by, about = joint_velocity(turns, link, place), times(three(link, JOINT_AXIS), turns)
+            by, about = joint_velocity(turns, link, place), times(three_from(link, JOINT_AXIS), turns)
             for k in range(3):
                 generalised_forces[j] -= kg * by[k] * a[k] + about[k] * t[k]
-            put(row, 0, by)
-            put(row, 3, about)
-            put(row, 6, rotated(tensor, about))
+            put_three(row, 0, by)
+            put_three(row, 3, about)
+            put_three(row, 6, rotated_vector(tensor, about))
             count, j = count + 1, int(joints[j, PARENT])
         for i in range(count):
             for two in range(count):
@@ -158,7 +162,7 @@ def add_inertia(joints, bodies, body_motions, gravity, mass_matrix, generalised_
 
 
 @lean
-def solve(matrix, right_sides):
+def solve_in_place(matrix, right_sides):
     """Solve the linear system in place for each right-hand side, a row of ``right_sides`` (k, n). The positive definite
     matrix is replaced by its Cholesky factor."""
     n = len(matrix)

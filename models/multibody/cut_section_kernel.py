@@ -42,12 +42,12 @@ from models.multibody.cut_mechanics import (
     bias_acceleration,
     body_inertia_terms,
     joint_velocity,
-    locate,
-    rotated,
-    solve,
+    point_position,
+    rotated_vector,
+    solve_in_place,
 )
-from models.multibody.tree import cross, plus, put, three, times
-from models.multibody.tree import out as into
+from models.multibody.tree import cross, plus, put_three, three_from, times
+from models.multibody.tree import vector_in_carrier_axes as into
 from models.vehicles.cut_vehicle import ROLL
 
 ELEMENT, CHASSIS_ROW, MOMENTS, POINT = 2, 9, 2, 3
@@ -78,7 +78,7 @@ def _point_acceleration(joints, body_motions, last_joint, qdd, position, acceler
     while j >= 0:
         link, turns = body_motions[j + 1], joints[j, ROTATES]
         acceleration = plus(acceleration, times(joint_velocity(turns, link, position), qdd[j]))
-        turning = plus(turning, times(times(three(link, JOINT_AXIS), turns), qdd[j]))
+        turning = plus(turning, times(times(three_from(link, JOINT_AXIS), turns), qdd[j]))
         j = int(joints[j, PARENT])
     return acceleration, turning
 
@@ -93,11 +93,11 @@ def _write_body_loads(joints, bodies, body_motions, gravity, qdd, loads):
     for b in range(len(bodies)):
         body, row, last = bodies[b], loads[b], int(bodies[b, LAST])
         arm, a, t = body_inertia_terms(body_motions[last + 1], body, gravity, tensor)
-        place = plus(three(body_motions[last + 1], POSITION), arm)
+        place = plus(three_from(body_motions[last + 1], POSITION), arm)
         a, turning = _point_acceleration(joints, body_motions, last, qdd, place, a)
-        put(row, 0, place)
-        put(row, 3, times(a, body[MASS]))
-        put(row, 6, plus(t, rotated(tensor, turning)))
+        put_three(row, 0, place)
+        put_three(row, 3, times(a, body[MASS]))
+        put_three(row, 6, plus(t, rotated_vector(tensor, turning)))
 
 
 @lean
@@ -105,9 +105,9 @@ def _write_hub_loads(table_head, hubs, body_motions, wrenches, loads):
     """Write position, force and moment of each hub's load, with negative sign because the load acts from outside."""
     for i in range(len(hubs)):
         hub, row, body_frame = hubs[i], loads[i], body_motions[wrench_axes_row(table_head, hubs[i])]
-        put(row, 0, locate(body_motions[int(hub[LAST]) + 1], hub, ARM))
-        put(row, 3, times(rotated(body_frame, three(wrenches[i], 0)), -1.0))
-        put(row, 6, times(rotated(body_frame, three(wrenches[i], 3)), -1.0))
+        put_three(row, 0, point_position(body_motions[int(hub[LAST]) + 1], hub, ARM))
+        put_three(row, 3, times(rotated_vector(body_frame, three_from(wrenches[i], 0)), -1.0))
+        put_three(row, 6, times(rotated_vector(body_frame, three_from(wrenches[i], 3)), -1.0))
 
 
 @lean
@@ -116,19 +116,19 @@ def _write_element_loads(elements, body_motions, element_forces, loads, travels)
     fixed, all with negative sign. Also writes its travel."""
     for i in range(len(elements)):
         e = elements[i]
-        axis = rotated(body_motions[int(e[AXIS_JOINT]) + 1], three(e, AXIS))
+        axis = rotated_vector(body_motions[int(e[AXIS_JOINT]) + 1], three_from(e, AXIS))
         travels[i] = -e[DESIGN_TRAVEL]
         for side in range(2):
             row, sign = loads[3 * i + side], 2.0 * side - 1.0
-            place = locate(body_motions[int(e[FIRST_BODY + SECOND_BODY * side]) + 1], e, SECOND_BODY * side + 1)
+            place = point_position(body_motions[int(e[FIRST_BODY + SECOND_BODY * side]) + 1], e, SECOND_BODY * side + 1)
             for k in range(3):
                 travels[i] += sign * axis[k] * place[k]
-            put(row, 0, place)
-            put(row, 3, times(axis, sign * element_forces[i]))
-            put(row, 6, (0.0, 0.0, 0.0))
-        put(loads[3 * i + 2], 0, (0.0, 0.0, 0.0))
-        put(loads[3 * i + 2], 3, (0.0, 0.0, 0.0))
-        put(loads[3 * i + 2], 6, times(cross(axis, span_vector(e, body_motions)), element_forces[i]))
+            put_three(row, 0, place)
+            put_three(row, 3, times(axis, sign * element_forces[i]))
+            put_three(row, 6, (0.0, 0.0, 0.0))
+        put_three(loads[3 * i + 2], 0, (0.0, 0.0, 0.0))
+        put_three(loads[3 * i + 2], 3, (0.0, 0.0, 0.0))
+        put_three(loads[3 * i + 2], 6, times(cross(axis, span_vector(e, body_motions)), element_forces[i]))
 
 
 @lean
@@ -139,9 +139,9 @@ def _resultant(body_loads, is_carried, reference_point):
     for i in range(len(body_loads)):
         if is_carried[i] != 0.0:
             row = body_loads[i]
-            arm = plus(three(row, 0), times(reference_point, -1.0))
-            force, moment = plus(force, three(row, 3)), plus(moment, three(row, 6))
-            moment = plus(moment, cross(arm, three(row, 3)))
+            arm = plus(three_from(row, 0), times(reference_point, -1.0))
+            force, moment = plus(force, three_from(row, 3)), plus(moment, three_from(row, 6))
+            moment = plus(moment, cross(arm, three_from(row, 3)))
     return force, moment
 
 
@@ -150,9 +150,11 @@ def _measured_acceleration(joints, body_motions, point, gravity, qdd):
     """Acceleration (3,) that an accelerometer at a point measures, in the axes of the body that carries the point."""
     last = int(point[JOINT])
     link = body_motions[last + 1]
-    arm = rotated(link, three(point, POINT_ARM))
+    arm = rotated_vector(link, three_from(point, POINT_ARM))
     a = bias_acceleration(link, arm, gravity * point[WEIGHT])
-    return into(link, _point_acceleration(joints, body_motions, last, qdd, plus(three(link, POSITION), arm), a)[0], 0)
+    return into(
+        link, _point_acceleration(joints, body_motions, last, qdd, plus(three_from(link, POSITION), arm), a)[0], 0
+    )
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -174,7 +176,7 @@ def section_results(parameter_table, half_steps_between, states, section_places,
         sides[:] = 0.0
         forces(parameter_table, i * half_steps_between / per_time, q, v, links, sides[0], told)
         add_inertia(joints, bodies, links, gravity, mass, sides[0])
-        solve(mass, sides)
+        solve_in_place(mass, sides)
         _write_body_loads(joints, bodies, links, gravity, sides[0], loads[:b])
         _write_hub_loads(head, hubs, links, wrenches, loads[b : b + h])
         _write_element_loads(elements, links, inside, loads[b + h :], travels)
@@ -182,24 +184,24 @@ def section_results(parameter_table, half_steps_between, states, section_places,
         at = 2 * e
         for k in range(6):
             row[at + k] = q[k]
-        put(row, at + 6, into(links[ROLL + 1], links[ROLL + 1], OMEGA))
+        put_three(row, at + 6, into(links[ROLL + 1], links[ROLL + 1], OMEGA))
         row[at + 9 : at + 11] = moments
         at += CHASSIS_ROW + MOMENTS
         for g in range(len(guides)):
             last = int(guides[g])
-            force, moment = _resultant(loads, section_places.carried_loads[g], three(links[last + 1], POSITION))
+            force, moment = _resultant(loads, section_places.carried_loads[g], three_from(links[last + 1], POSITION))
             at = _write_wrench(links[last + 1 if in_body_axes else chassis + 1], force, moment, row, at)
         for g in range(h):
-            force, moment = times(three(loads[b + g], 3), -1.0), times(three(loads[b + g], 6), -1.0)
+            force, moment = times(three_from(loads[b + g], 3), -1.0), times(three_from(loads[b + g], 6), -1.0)
             at = _write_wrench(links[int(hubs[g, LAST]) + 1 if in_body_axes else chassis + 1], force, moment, row, at)
         for g in range(len(points)):
-            put(row, at, _measured_acceleration(joints, links, points[g], gravity, sides[0]))
+            put_three(row, at, _measured_acceleration(joints, links, points[g], gravity, sides[0]))
             at += POINT
 
 
 @lean
 def _write_wrench(body_motion, force, moment, result_row, first_index):
     """Write force and moment, given in space, in the axes of a row of ``links``. Returns the index after them."""
-    put(result_row, first_index, into(body_motion, force, 0))
-    put(result_row, first_index + 3, into(body_motion, moment, 0))
+    put_three(result_row, first_index, into(body_motion, force, 0))
+    put_three(result_row, first_index + 3, into(body_motion, moment, 0))
     return first_index + WRENCH

@@ -8,8 +8,8 @@ import numpy as np
 
 from models.multibody import cut_kernel as kernel
 from models.multibody.parts import curve_numbers
-from models.vehicles.cut_vehicle import ROLL, CutVehicle, Element
-from models.vehicles.free_vehicle import joints as free_joints
+from models.vehicles.cut_vehicle import ROLL, CutVehicle, CutVehicleElement
+from models.vehicles.free_vehicle import joint_table as free_joints
 from models.vehicles.free_vehicle import last_coordinate_and_joint
 from models.vehicles.spatial import Vector
 
@@ -62,7 +62,7 @@ class HubInputs:
 
 
 @dataclass(frozen=True)
-class Joints:
+class JointTable:
     """Joint table of a cut vehicle. For every body by name: the index of its last joint, and the position (m) of
     that joint."""
 
@@ -71,19 +71,19 @@ class Joints:
     joint_position: dict[str, Vector]
 
 
-def joints(vehicle: CutVehicle) -> Joints:
+def joint_table_of(vehicle: CutVehicle) -> JointTable:
     """Joint table of a cut vehicle, in the order of its coordinates. All joints of a body have the same position, that
     of the first."""
     kind, below, *arm = free_joints(vehicle.tree).T
     anchors = {body.name: last_coordinate_and_joint(vehicle.tree, body.name) for body in vehicle.tree.bodies}
     rows = np.column_stack([below, kind >= 3, kind % 3, *arm])
     origin = {name: place for name, (_, place) in anchors.items()}
-    return Joints(rows, {name: joint for name, (joint, _) in anchors.items()}, origin)
+    return JointTable(rows, {name: joint for name, (joint, _) in anchors.items()}, origin)
 
 
-def table(vehicle: CutVehicle, hub_inputs: HubInputs, time_step: float) -> np.ndarray:
+def cut_vehicle_table(vehicle: CutVehicle, hub_inputs: HubInputs, time_step: float) -> np.ndarray:
     """Table of all numbers that the compiled forces of a cut vehicle read, for a run with a step (s)."""
-    joined = joints(vehicle)
+    joined = joint_table_of(vehicle)
     bodies = []
     for body in (body for body in vehicle.tree.bodies if body.mass or np.any(body.inertia)):
         arm = np.subtract(body.position, joined.joint_position[body.name])
@@ -128,7 +128,7 @@ def _put_curves(vehicle: CutVehicle, element_rows: np.ndarray, first_index: int)
     return np.array(placed)
 
 
-def _element_numbers(element: Element, joint_table: Joints) -> list[float]:
+def _element_numbers(element: CutVehicleElement, joint_table: JointTable) -> list[float]:
     first, two = (
         np.subtract(element.first_point, joint_table.joint_position[element.first_body]),
         np.subtract(element.second_point, joint_table.joint_position[element.second_body]),
@@ -154,7 +154,7 @@ def _element_numbers(element: Element, joint_table: Joints) -> list[float]:
     ]
 
 
-def _hub_numbers(vehicle: CutVehicle, joint_table: Joints, hub_index: int) -> list[float]:
+def _hub_numbers(vehicle: CutVehicle, joint_table: JointTable, hub_index: int) -> list[float]:
     """Numbers of a wheel hub, including those of the tyre that was on it."""
     tyre = vehicle.uncut.tyres[hub_index]
     side = next((force for force in vehicle.uncut.side_forces if force.name == tyre.name), None)

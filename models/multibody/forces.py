@@ -19,8 +19,8 @@ from models.contact.fastsim_many import LOAD, MU, A, B
 from models.machine.compiled import lean
 from models.machine.stack import array, at, beyond, doubles, row, start
 from models.multibody.moving_vehicle import (
+    BodyTree,
     MovingVehicle,
-    Tree,
     WheelContact,
     carried_velocity,
     carrier_frame,
@@ -38,19 +38,19 @@ from models.multibody.tree import (
     TURNING,
     TWISTED,
     WHERE,
-    add,
+    add_body_force,
+    add_body_moment,
+    add_three,
     cross,
     dot,
-    inwards,
-    locate,
-    out,
-    outwards,
+    gather_forces_inwards,
+    locate_points,
+    move_outwards,
     plus,
-    push,
-    put,
-    three,
+    put_three,
+    three_from,
     times,
-    twist,
+    vector_in_carrier_axes,
 )
 from models.tyre.bristles import FIRST_FLEXIBILITY, tyre_forces
 
@@ -126,7 +126,7 @@ normal to the road, axle, force of its load, velocity of its centre (3 each)."""
 
 
 @lean
-def control(parameter_table, first_index, control_index, knot_count, t):
+def control_value_and_rate(parameter_table, first_index, control_index, knot_count, t):
     """Value and rate (per s) of a steering, brake, drive or push control at a time (s). Its rate is 0 at every knot;
     between knots it follows the smoothest polynomial of degree 5."""
     knots = parameter_table[first_index + 2 * control_index * knot_count :]
@@ -142,7 +142,7 @@ def control(parameter_table, first_index, control_index, knot_count, t):
 
 
 @lean
-def height(road_waves, wave_count, x, y):
+def road_height_and_slopes(road_waves, wave_count, x, y):
     """Height (m) of the road at x, y (m), and its slopes along x and y: a sum of plane waves."""
     z = along = across = 0.0
     for i in range(0, 4 * wave_count, 4):
@@ -156,7 +156,7 @@ def height(road_waves, wave_count, x, y):
 
 
 @lean
-def _axle(steer_angle, wheel_inclination):
+def _axle_vector(steer_angle, wheel_inclination):
     """Unit vector along the axle, to the left, of a wheel at steer angle ``steer_angle`` and inclination
     ``wheel_inclination`` (rad)."""
     cosine, sine, level, lean_of = 1.0, 0.0, 1.0, 0.0
@@ -171,7 +171,7 @@ def _axle(steer_angle, wheel_inclination):
 def _axle_of_towed_wheel(carrier_link, axle):
     """Axle of a towed body's wheel, rotated in the road's plane from the carrier's heading to the heading of the x axis
     of ``carrier_link``."""
-    x, y, _ = three(carrier_link, TURNED)
+    x, y, _ = three_from(carrier_link, TURNED)
     level = math.sqrt(x * x + y * y)
     return (x * axle[0] - y * axle[1]) / level, (y * axle[0] + x * axle[1]) / level, axle[2]
 
@@ -181,7 +181,7 @@ def _road_under(road_waves, wave_count, moving_frame, position):
     """Height (m) of the road, and its upward normal (-dz/dx, -dz/dy, 1), under a position (m) given in the carrier's
     axes."""
     x, y = ground_position(moving_frame, position)
-    zeta, dx, dy = height(road_waves, wave_count, x, y)
+    zeta, dx, dy = road_height_and_slopes(road_waves, wave_count, x, y)
     return zeta, (
         -(moving_frame.cosine * dx + moving_frame.sine * dy),
         moving_frame.sine * dx - moving_frame.cosine * dy,
@@ -190,7 +190,7 @@ def _road_under(road_waves, wave_count, moving_frame, position):
 
 
 @lean
-def _load(tyre_row, deflection, rising_speed, energy_ledger):
+def _tyre_load(tyre_row, deflection, rising_speed, energy_ledger):
     """Vertical load (N) of a tyre at a deflection (m) from rest whose centre rises from the road at ``rising_speed``
     (m/s). Adds its energy and power to the ledger."""
     elastic = max(tyre_row[STATIC] + tyre_row[VERTICAL] * deflection, 0.0)
@@ -210,13 +210,17 @@ def find_contact(tyre_row, road_waves, wave_count, steer_angle, steer_rate, movi
     frame, tree, patch, slip = moving_vehicle.frame, moving_vehicle.tree, wheel_contact.patch, wheel_contact.slip
     way, report = wheel_contact.way, wheel_contact.report
     spot, knuckle = row(tree.spots, PER_SPOT, int(tyre_row[POINT])), row(tree.links, PER_LINK, int(tyre_row[KNUCKLE]))
-    p, turning, axle = three(spot, WHERE), three(knuckle, TURNING), _axle(steer_angle, tyre_row[INCLINED])
+    p, turning, axle = (
+        three_from(spot, WHERE),
+        three_from(knuckle, TURNING),
+        _axle_vector(steer_angle, tyre_row[INCLINED]),
+    )
     carrying = row(tree.links, PER_LINK, int(tyre_row[CARRYING]))
     if tyre_row[TOWED] != 0.0:
         axle = _axle_of_towed_wheel(carrying, axle)
-    passing = plus(three(spot, RATE), carried_velocity(frame, p))
+    passing = plus(three_from(spot, RATE), carried_velocity(frame, p))
     zeta, upwards = _road_under(road_waves, wave_count, frame, p)
-    load = _load(tyre_row, zeta - (p[2] - tyre_row[HEIGHT]), dot(passing, upwards), moving_vehicle.ledger)
+    load = _tyre_load(tyre_row, zeta - (p[2] - tyre_row[HEIGHT]), dot(passing, upwards), moving_vehicle.ledger)
     long = math.sqrt(dot(upwards, upwards))
     normal = times(upwards, 1.0 / long)
     along = cross(axle, normal)
@@ -225,7 +229,7 @@ def find_contact(tyre_row, road_waves, wave_count, steer_angle, steer_rate, movi
     radius = max(p[2] - zeta, 0.0) / (long * flat)
     down = times(plus(times(axle, dot(axle, normal)), times(normal, -1.0)), radius / flat)
     across, rotor = cross(normal, along), int(tyre_row[ROTOR])
-    spin = moving_vehicle.rates[rotor] if rotor >= 0 else dot(three(carrying, TURNING), axle) - dot(turning, axle)
+    spin = moving_vehicle.rates[rotor] if rotor >= 0 else dot(three_from(carrying, TURNING), axle) - dot(turning, axle)
     whole = plus(plus(turning, times(axle, spin)), (0.0, 0.0, frame.yaw_rate + steer_rate))
     sliding = plus(passing, cross(whole, down))
     slip[0], slip[1], slip[2] = dot(sliding, along), dot(sliding, across), dot(whole, normal)
@@ -236,14 +240,14 @@ def find_contact(tyre_row, road_waves, wave_count, steer_angle, steer_rate, movi
     patch[FIRST_FLEXIBILITY] = patch[FIRST_FLEXIBILITY + 1] = patch[FIRST_FLEXIBILITY + 2] = 1.0 / tyre_row[BRISTLES]
     report[PRESS], report[ANGLE] = pressing, steer_angle
     report[SLIP_X], report[SLIP_Y], report[TURN], report[TREAD] = slip[0], slip[1], slip[2], slip[3]
-    put(way, CENTRE, p)
-    put(way, DOWN, down)
-    put(way, ROLLING, along)
-    put(way, ACROSS, across)
-    put(way, NORMAL, normal)
-    put(way, AXLE, axle)
-    put(way, LOADING, times(upwards, load))
-    put(way, PASSING, passing)
+    put_three(way, CENTRE, p)
+    put_three(way, DOWN, down)
+    put_three(way, ROLLING, along)
+    put_three(way, ACROSS, across)
+    put_three(way, NORMAL, normal)
+    put_three(way, AXLE, axle)
+    put_three(way, LOADING, times(upwards, load))
+    put_three(way, PASSING, passing)
 
 
 @lean
@@ -254,13 +258,13 @@ def add_creep_forces(tyre_row, creep_forces, moving_vehicle, wheel_contact):
     knuckle, rotor, axle = (
         row(moving_vehicle.tree.links, PER_LINK, int(tyre_row[KNUCKLE])),
         int(tyre_row[ROTOR]),
-        three(way, AXLE),
+        three_from(way, AXLE),
     )
-    force = plus(times(three(way, ROLLING), creep_forces[0]), times(three(way, ACROSS), creep_forces[1]))
-    turning = times(three(way, NORMAL), creep_forces[2])
-    moment = plus(cross(three(way, DOWN), force), turning)
-    push(knuckle, ground, plus(force, three(way, LOADING)), three(way, CENTRE))
-    twist(knuckle, ground, moment)
+    force = plus(times(three_from(way, ROLLING), creep_forces[0]), times(three_from(way, ACROSS), creep_forces[1]))
+    turning = times(three_from(way, NORMAL), creep_forces[2])
+    moment = plus(cross(three_from(way, DOWN), force), turning)
+    add_body_force(knuckle, ground, plus(force, three_from(way, LOADING)), three_from(way, CENTRE))
+    add_body_moment(knuckle, ground, moment)
     torque = dot(axle, moment)
     if rotor >= 0:
         moving_vehicle.forces[rotor] += torque
@@ -279,13 +283,15 @@ def add_creep_forces(tyre_row, creep_forces, moving_vehicle, wheel_contact):
 def add_wheel_torque(tyre_row, brake_torque, drive_torque, moving_vehicle, wheel_contact):
     """Add the torque (N m) of brake and drive to a wheel's spin, and the opposite torque to the body that carries the
     wheel."""
-    rotor, axle, report = int(tyre_row[ROTOR]), three(wheel_contact.way, AXLE), wheel_contact.report
+    rotor, axle, report = int(tyre_row[ROTOR]), three_from(wheel_contact.way, AXLE), wheel_contact.report
     report[SPIN_TORQUE] = 0.0
     if rotor < 0 or (brake_torque == 0.0 and drive_torque == 0.0):
         return
     knuckle = row(moving_vehicle.tree.links, PER_LINK, int(tyre_row[KNUCKLE]))
     carrying = row(moving_vehicle.tree.links, PER_LINK, int(tyre_row[CARRYING]))
-    spin = moving_vehicle.rates[rotor] + dot(three(knuckle, TURNING), axle) - dot(three(carrying, TURNING), axle)
+    spin = (
+        moving_vehicle.rates[rotor] + dot(three_from(knuckle, TURNING), axle) - dot(three_from(carrying, TURNING), axle)
+    )
     report[SPIN_TORQUE] = tyre_row[DRIVEN] * drive_torque
     if brake_torque != 0.0:
         report[SPIN_TORQUE] -= tyre_row[BRAKED] * brake_torque * math.tanh(spin / tyre_row[BRAKE_RATE])
@@ -297,8 +303,8 @@ def add_wheel_torque(tyre_row, brake_torque, drive_torque, moving_vehicle, wheel
 @lean
 def _transfer_torque(torque, axle, knuckle_link, carrier_link):
     """Transfer a torque (N m) about the axle from the link of a wheel's knuckle to the link that carries the wheel."""
-    add(knuckle_link, TWISTED, times(axle, -torque))
-    add(carrier_link, TWISTED, times(axle, torque))
+    add_three(knuckle_link, TWISTED, times(axle, -torque))
+    add_three(carrier_link, TWISTED, times(axle, torque))
 
 
 @lean
@@ -317,8 +323,8 @@ def start_forces(parameter_table, q, v, generalised_forces, workspace, energy_le
     spots = beyond(workspace, PER_LINK * n)
     ground = array(beyond(spots, PER_SPOT * points), (GROUND,))
     ground[0] = ground[1] = ground[2] = 0.0
-    outwards(beyond(table, HEADER), n, q, v, workspace)
-    locate(beyond(table, int(parameter_table[OF_POINTS])), points, workspace, spots)
+    move_outwards(beyond(table, HEADER), n, q, v, workspace)
+    locate_points(beyond(table, int(parameter_table[OF_POINTS])), points, workspace, spots)
     for i in range(LEDGER):
         energy_ledger[i] = 0.0
     energy_ledger[POTENTIAL], energy_ledger[DISSIPATED] = add_part_forces(
@@ -326,7 +332,7 @@ def start_forces(parameter_table, q, v, generalised_forces, workspace, energy_le
     )
     chassis = row(workspace, PER_LINK, int(parameter_table[CHASSIS]))
     return MovingVehicle(
-        v, generalised_forces, energy_ledger, carrier_frame(q, v), Tree(workspace, spots, ground), chassis
+        v, generalised_forces, energy_ledger, carrier_frame(q, v), BodyTree(workspace, spots, ground), chassis
     )
 
 
@@ -336,8 +342,8 @@ def finish_forces(parameter_table, moving_vehicle):
     goes into the ledger."""
     table, frame, f = start(parameter_table), moving_vehicle.frame, moving_vehicle.forces
     if parameter_table[DRAG] != 0.0:
-        _drag(parameter_table, moving_vehicle)
-    inwards(
+        _add_drag(parameter_table, moving_vehicle)
+    gather_forces_inwards(
         beyond(table, HEADER),
         int(parameter_table[JOINTS]),
         beyond(table, int(parameter_table[OF_POINTS])),
@@ -352,19 +358,19 @@ def finish_forces(parameter_table, moving_vehicle):
 
 
 @lean
-def _drag(parameter_table, moving_vehicle):
+def _add_drag(parameter_table, moving_vehicle):
     """Add aerodynamic drag (N) at the chassis' centre, against its forward motion."""
     chassis, frame = moving_vehicle.chassis, moving_vehicle.frame
-    place = plus(three(chassis, PLACE), out(chassis, parameter_table, DRAG_X))
-    speed = plus(three(chassis, SPEED), cross(three(chassis, TURNING), place))
+    place = plus(three_from(chassis, PLACE), vector_in_carrier_axes(chassis, parameter_table, DRAG_X))
+    speed = plus(three_from(chassis, SPEED), cross(three_from(chassis, TURNING), place))
     ahead = speed[0] + frame.forward_speed - frame.yaw_rate * place[1]
     force = -parameter_table[DRAG] * abs(ahead) * ahead
     moving_vehicle.ledger[DISSIPATED] += force * ahead
-    push(chassis, moving_vehicle.tree.ground, (force, 0.0, 0.0), place)
+    add_body_force(chassis, moving_vehicle.tree.ground, (force, 0.0, 0.0), place)
 
 
 @lean
-def _push_from_outside(parameter_table, t, moving_vehicle):
+def _add_external_pushes(parameter_table, t, moving_vehicle):
     """Add the forces of all external pushes, whose directions turn with the vehicle's heading, and their power to the
     ledger."""
     controls, knots, table = int(parameter_table[OF_KNOTS]), int(parameter_table[KNOTS]), start(parameter_table)
@@ -372,13 +378,16 @@ def _push_from_outside(parameter_table, t, moving_vehicle):
     for i in range(count):
         of = row(beyond(table, controls - 1 - PER_PUSH * count), PER_PUSH, i)
         link = row(moving_vehicle.tree.links, PER_LINK, int(of[PUSHED_BY]))
-        force = times(three(of, PUSH_AXIS), control(parameter_table, controls, FIRST_PUSH + i, knots, t)[0])
-        place = plus(three(link, PLACE), out(link, of, PUSHED_AT))
+        force = times(
+            three_from(of, PUSH_AXIS), control_value_and_rate(parameter_table, controls, FIRST_PUSH + i, knots, t)[0]
+        )
+        place = plus(three_from(link, PLACE), vector_in_carrier_axes(link, of, PUSHED_AT))
         speed = plus(
-            plus(three(link, SPEED), cross(three(link, TURNING), place)), carried_velocity(moving_vehicle.frame, place)
+            plus(three_from(link, SPEED), cross(three_from(link, TURNING), place)),
+            carried_velocity(moving_vehicle.frame, place),
         )
         moving_vehicle.ledger[DISSIPATED] += dot(force, speed)
-        push(link, moving_vehicle.tree.ground, force, place)
+        add_body_force(link, moving_vehicle.tree.ground, force, place)
 
 
 @lean
@@ -397,10 +406,10 @@ def all_forces(parameter_table, t, q, v, generalised_forces, tyre_report, energy
     vehicle = start_forces(
         parameter_table, q, v, generalised_forces, doubles(workspace_size(parameter_table)), energy_ledger
     )
-    steer, steering = control(parameter_table, controls, STEER, knots, t)
+    steer, steering = control_value_and_rate(parameter_table, controls, STEER, knots, t)
     braking, driving = (
-        control(parameter_table, controls, BRAKE, knots, t)[0],
-        control(parameter_table, controls, DRIVE, knots, t)[0],
+        control_value_and_rate(parameter_table, controls, BRAKE, knots, t)[0],
+        control_value_and_rate(parameter_table, controls, DRIVE, knots, t)[0],
     )
     patches, ways = array(doubles(10 * w), (w, 10)), doubles(WAY * w)
     slips, creeping = array(doubles(4 * w), (w, 4)), array(doubles(4 * w), (w, 4))
@@ -418,7 +427,7 @@ def all_forces(parameter_table, t, q, v, generalised_forces, tyre_report, energy
         add_creep_forces(tyre, creeping[i], vehicle, wheel)
         add_wheel_torque(tyre, braking, driving, vehicle, wheel)
         energy_ledger[STEER_POWER] -= tyre[STEERED] * steering * tyre_report[i, STEER_MOMENT]
-    _push_from_outside(parameter_table, t, vehicle)
+    _add_external_pushes(parameter_table, t, vehicle)
     finish_forces(parameter_table, vehicle)
 
 
@@ -450,7 +459,7 @@ def set_forces(block_address, t, coordinate_count):
 
 
 @lean
-def reports(parameter_table, times, q, v, tyre_reports, energy_ledgers):
+def fill_reports(parameter_table, times, q, v, tyre_reports, energy_ledgers):
     """Fill the tyres' reports (m, tyres, REPORTED) and energy ledgers (m, LEDGER) of states (m, n) at ``times``
     (m,)."""
     f = array(doubles(q.shape[1]), (q.shape[1],))

@@ -25,7 +25,7 @@ class CarrierFrame(NamedTuple):
     yaw_rate: float
 
 
-class Tree(NamedTuple):
+class BodyTree(NamedTuple):
     """Pointers to the rows of bodies (links) and of force points (spots), see ``models.multibody.tree``, and the forces
     (GROUND,) on the carrier."""
 
@@ -44,7 +44,7 @@ class MovingVehicle(NamedTuple):
     forces: np.ndarray
     ledger: np.ndarray
     frame: CarrierFrame
-    tree: Tree
+    tree: BodyTree
     chassis: np.ndarray
 
 

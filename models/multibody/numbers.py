@@ -11,9 +11,16 @@ from models.multibody import forces as at
 from models.multibody import tree
 from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART, curve_numbers
 from models.tyre.bristles import cornering_stiffness_factor, patch_grid
-from models.vehicles.free_vehicle import CARRIER, chassis_of, free_vehicle, joints, last_coordinate_and_joint, rotor
+from models.vehicles.free_vehicle import (
+    CARRIER,
+    chassis_of,
+    free_vehicle,
+    joint_table,
+    last_coordinate_and_joint,
+    rotor_name,
+)
 from models.vehicles.spatial import Curve, SpatialVehicle, Vector
-from models.vehicles.spatial_linear import Preloads, preloads, with_preloads
+from models.vehicles.spatial_linear import Preloads, static_preloads, with_preloads
 
 Control = tuple[tuple[float, float], ...]
 """Knots (time in s, value) of a control over time; it rests at each knot and goes from one to the next by the smoothest
@@ -22,7 +29,7 @@ GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
-class Tyres:
+class TyreParameters:
     """Tyre and wheel parameters that the vehicle file does not give.
 
     friction : mu; half_width : of the patch (m); inclination : of the wheels of the left side about their forward
@@ -57,7 +64,7 @@ class Controls:
 
 
 @dataclass(frozen=True)
-class Push:
+class ExternalPush:
     """External force on a body, such as wind: ``size`` (N, over time) along ``axis``, x ahead, y to the left and z up.
     The axes turn with the vehicle's heading only. It acts at ``point`` (m) of a body, in the design position."""
 
@@ -78,11 +85,11 @@ class Handling:
     """
 
     given: SpatialVehicle
-    tyres: Tyres = Tyres()
+    tyres: TyreParameters = TyreParameters()
     controls: Controls = Controls()
     waves: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
     slope: float = 0.0
-    pushes: tuple[Push, ...] = ()
+    pushes: tuple[ExternalPush, ...] = ()
     forces: Literal["native", "compiled"] = "native"
     vehicle: SpatialVehicle = field(init=False)
     held: Preloads = field(init=False)
@@ -94,10 +101,10 @@ class Handling:
         for name in set(tyres.fixed) - set(names):
             raise InputError(self.given.name, "fixed", name, "no such tyre", names)
         free = free_vehicle(self.given, GRAVITY * float(np.cos(self.slope)), tyres.spin_inertia, tyres.fixed)
-        held = preloads(free)
+        held = static_preloads(free)
         object.__setattr__(self, "vehicle", with_preloads(free, held))
         object.__setattr__(self, "held", held)
-        object.__setattr__(self, "numbers", table(self))
+        object.__setattr__(self, "numbers", free_vehicle_table(self))
 
     @property
     def gravity(self) -> np.ndarray:
@@ -119,28 +126,28 @@ class Handling:
         v = np.zeros(len(places))
         v[0] = speed
         for tyre in self.vehicle.tyres:
-            if (rotor(tyre.name), "ry") in places:
-                v[places.index((rotor(tyre.name), "ry"))] = speed / tyre.point[2]
+            if (rotor_name(tyre.name), "ry") in places:
+                v[places.index((rotor_name(tyre.name), "ry"))] = speed / tyre.point[2]
         return np.zeros(len(places)), v
 
 
-def table(vehicle_on_tyres: Handling) -> np.ndarray:
+def free_vehicle_table(vehicle_on_tyres: Handling) -> np.ndarray:
     """Table of all numbers that the compiled forces of a free vehicle read, in the order described in ``forces``."""
     free, chassis, of, points = (
         vehicle_on_tyres.vehicle,
         chassis_of(vehicle_on_tyres.given),
         patch_grid(vehicle_on_tyres.tyres.cells),
-        _Points(vehicle_on_tyres.vehicle),
+        _ForcePoints(vehicle_on_tyres.vehicle),
     )
-    parts = [*_springs(vehicle_on_tyres, points), *_bars(vehicle_on_tyres, points)]
+    parts = [*_spring_rows(vehicle_on_tyres, points), *_bar_rows(vehicle_on_tyres, points)]
     tyres, knots = (
-        [_tyre(vehicle_on_tyres, i, points) for i in range(len(free.tyres))],
-        _knots(vehicle_on_tyres.controls, vehicle_on_tyres.pushes),
+        [_tyre_row(vehicle_on_tyres, i, points) for i in range(len(free.tyres))],
+        _control_knots(vehicle_on_tyres.controls, vehicle_on_tyres.pushes),
     )
-    pushes = _pushes(vehicle_on_tyres)
+    pushes = _push_rows(vehicle_on_tyres)
     held = {*pushes[at.PUSHED_BY : -1 : at.PER_PUSH], *(row[tree.JOINT] for row in points.rows)}
     sections = [
-        _joints(free, held),
+        _joint_rows(free, held),
         np.ravel(points.rows),
         np.ravel([row for row, _ in parts]),
         np.ravel(tyres),
@@ -168,7 +175,7 @@ def table(vehicle_on_tyres: Handling) -> np.ndarray:
     return np.concatenate([np.array(head, float), *sections, curves])
 
 
-class _Points:
+class _ForcePoints:
     """List of points at which forces act, without duplicates; their rows are in the form that ``tree`` reads."""
 
     def __init__(self, vehicle: SpatialVehicle) -> None:
@@ -184,13 +191,13 @@ class _Points:
         return self.rows.index(row)
 
 
-def _joints(vehicle: SpatialVehicle, loaded_coordinates: set[float]) -> np.ndarray:
+def _joint_rows(vehicle: SpatialVehicle, loaded_coordinates: set[float]) -> np.ndarray:
     """Table rows of all coordinates, each with the number of coordinates of its body. The rotation of a body that
     carries nothing is marked ``LOOSE``.
 
     loaded_coordinates : coordinates that are the last to move a point where something acts.
     """
-    rows, counts = joints(vehicle), [len(body.freedoms) for body in vehicle.bodies for _ in body.freedoms]
+    rows, counts = joint_table(vehicle), [len(body.freedoms) for body in vehicle.bodies for _ in body.freedoms]
     bears = {*rows[:, tree.BELOW], *loaded_coordinates}
     loose = [counts[j] == 1 and row[tree.KIND] >= 3.0 and j not in bears for j, row in enumerate(rows)]
     rows[loose, tree.KIND] = tree.LOOSE
@@ -207,7 +214,7 @@ _PartRow = tuple[list[float], tuple[Curve | None, ...]]
 """Numbers of a spring or bar, as ``parts`` reads them, and its curves of force over travel and over rate."""
 
 
-def _springs(vehicle_on_tyres: Handling, force_points: _Points) -> Iterator[_PartRow]:
+def _spring_rows(vehicle_on_tyres: Handling, force_points: _ForcePoints) -> Iterator[_PartRow]:
     for s in vehicle_on_tyres.vehicle.springs:
         if s.second_body is None:
             raise InputError(
@@ -219,23 +226,23 @@ def _springs(vehicle_on_tyres: Handling, force_points: _Points) -> Iterator[_Par
         ends = force_points.number(s.first_body, s.first_point), force_points.number(s.second_body, s.second_point)
         rest = float(np.dot(np.subtract(s.second_point, s.first_point), s.axis))
         law = [s.stiffness, s.damping, vehicle_on_tyres.held.parts[s.name], s.friction, s.friction_rate, rest]
-        frame = _frame(vehicle_on_tyres.vehicle, f"springs[{s.name}]", s.frame)
+        frame = _last_coordinate_of_frame(vehicle_on_tyres.vehicle, f"springs[{s.name}]", s.frame)
         yield [*law, -1.0, 0.0, *ends, *s.axis, 0.0, 0.0, frame], (s.travel_force, s.rate_force)
 
 
-def _bars(vehicle_on_tyres: Handling, force_points: _Points) -> Iterator[_PartRow]:
+def _bar_rows(vehicle_on_tyres: Handling, force_points: _ForcePoints) -> Iterator[_PartRow]:
     for bar in vehicle_on_tyres.vehicle.bars:
         ends = force_points.number(bar.left, bar.point_left), force_points.number(bar.right, bar.point_right)
         rest, frame = (
             (bar.point_right[2] - bar.point_left[2]) / bar.track,
-            _frame(vehicle_on_tyres.vehicle, bar.name, bar.frame),
+            _last_coordinate_of_frame(vehicle_on_tyres.vehicle, bar.name, bar.frame),
         )
         law = [bar.stiffness, bar.damping, vehicle_on_tyres.held.parts[bar.name], 0.0, 1.0, rest]
         turns = [-1.0, 0.0] if frame else [float(vehicle_on_tyres.vehicle.coordinates().index((bar.body, "rx"))), 1.0]
         yield [*law, *turns, *ends, 0.0, 0.0, 1.0 / bar.track, 0.0, 0.0, frame], (None, None)
 
 
-def _frame(vehicle: SpatialVehicle, part_key_path: str, frame_body: str | None) -> float:
+def _last_coordinate_of_frame(vehicle: SpatialVehicle, part_key_path: str, frame_body: str | None) -> float:
     """Last coordinate of the body in which the axis of a spring or bar is fixed; 0 for the carrier."""
     if frame_body == CARRIER:
         return 0.0
@@ -257,7 +264,7 @@ def _put_curves(part_rows: list[_PartRow], table_rows: np.ndarray, first_index: 
     return laid_curves
 
 
-def _tyre(vehicle_on_tyres: Handling, tyre_index: int, force_points: _Points) -> list[float]:
+def _tyre_row(vehicle_on_tyres: Handling, tyre_index: int, force_points: _ForcePoints) -> list[float]:
     """Numbers of tyre i. Its bristle stiffness is chosen such that, at static load, it has the ride vehicle's cornering
     stiffness."""
     free, of = vehicle_on_tyres.vehicle, vehicle_on_tyres.tyres
@@ -270,7 +277,7 @@ def _tyre(vehicle_on_tyres: Handling, tyre_index: int, force_points: _Points) ->
     radius = tyre.point[2] + sunk
     cornering = next(force.stiffness for force in vehicle_on_tyres.given.side_forces if force.name == tyre.name)
     bristles = cornering / (cornering_stiffness_factor(of.cells) * radius * sunk * of.half_width)
-    spins = (rotor(tyre.name), "ry")
+    spins = (rotor_name(tyre.name), "ry")
     axle = [t for t in free.tyres if t.axle == tyre.axle]
     share, front, c = 1.0 / len(axle), tyre.axle == 0, vehicle_on_tyres.controls
     rear, towed = max(t.axle for t in free.tyres) or 1, free.towed_under(tyre.body)
@@ -301,7 +308,7 @@ def _tyre(vehicle_on_tyres: Handling, tyre_index: int, force_points: _Points) ->
     ]
 
 
-def _pushes(vehicle_on_tyres: Handling) -> np.ndarray:
+def _push_rows(vehicle_on_tyres: Handling) -> np.ndarray:
     """A row of numbers for each external push, and then the number of pushes."""
     names = tuple(body.name for body in vehicle_on_tyres.vehicle.bodies)
     for push in vehicle_on_tyres.pushes:
@@ -315,7 +322,7 @@ def _pushes(vehicle_on_tyres: Handling) -> np.ndarray:
     return np.array([*np.ravel(rows), len(rows)])
 
 
-def _knots(controls: Controls, pushes: tuple[Push, ...]) -> np.ndarray:
+def _control_knots(controls: Controls, pushes: tuple[ExternalPush, ...]) -> np.ndarray:
     """Knots (3 + pushes, 2, k) of steer, brake, drive and pushes: times and values, padded behind the last knot."""
     all_knots = (controls.steer, controls.brake, controls.drive, *(push.size for push in pushes))
     most = max(map(len, all_knots))

@@ -18,13 +18,13 @@ from models.multibody.tree import (
     TURNING,
     TWISTED,
     WHERE,
-    add,
+    add_three,
     cross,
     dot,
-    out,
     plus,
-    three,
+    three_from,
     times,
+    vector_in_carrier_axes,
 )
 from models.vehicles.spatial import Curve
 
@@ -63,15 +63,15 @@ def add_part_forces(parameter_table, first_index, part_count, links, force_point
         from_spot, to_spot, axis = (
             row(force_points, PER_SPOT, int(e[FIRST_POINT])),
             row(force_points, PER_SPOT, int(e[SECOND_POINT])),
-            three(e, AXIS),
+            three_from(e, AXIS),
         )
-        frame, apart = int(e[FRAME]), plus(three(to_spot, WHERE), times(three(from_spot, WHERE), -1.0))
+        frame, apart = int(e[FRAME]), plus(three_from(to_spot, WHERE), times(three_from(from_spot, WHERE), -1.0))
         if frame > 0:
-            axis = out(row(links, PER_LINK, frame), e, AXIS)
+            axis = vector_in_carrier_axes(row(links, PER_LINK, frame), e, AXIS)
         travel = dot(axis, apart) - e[REST]
-        rate = dot(axis, plus(three(to_spot, RATE), times(three(from_spot, RATE), -1.0)))
+        rate = dot(axis, plus(three_from(to_spot, RATE), times(three_from(from_spot, RATE), -1.0)))
         if frame > 0:
-            rate += dot(apart, cross(three(row(links, PER_LINK, frame), TURNING), axis))
+            rate += dot(apart, cross(three_from(row(links, PER_LINK, frame), TURNING), axis))
         coordinate = int(e[ADDED_COORDINATE])
         if coordinate >= 0:
             travel, rate = travel + e[ADDED_GAIN] * q[coordinate], rate + e[ADDED_GAIN] * v[coordinate]
@@ -79,23 +79,23 @@ def add_part_forces(parameter_table, first_index, part_count, links, force_point
         if e[FRICTION] != 0.0:
             other += e[FRICTION] * math.tanh(rate / e[FRICTION_RATE])
         if e[ON_TRAVEL] != 0.0:
-            other += on_curve(beyond(parameter_table, int(e[ON_TRAVEL])), travel)
+            other += curve_force(beyond(parameter_table, int(e[ON_TRAVEL])), travel)
         if e[ON_RATE] != 0.0:
-            other += on_curve(beyond(parameter_table, int(e[ON_RATE])), rate)
+            other += curve_force(beyond(parameter_table, int(e[ON_RATE])), rate)
         energy += (e[HELD] + 0.5 * e[STIFFNESS] * travel) * travel
         power -= other * rate
         if coordinate >= 0:
             generalised_forces[coordinate] -= (spring + other) * e[ADDED_GAIN]
         force = times(axis, spring + other)
-        add(from_spot, PUSH, force)
-        add(to_spot, PUSH, times(force, -1.0))
+        add_three(from_spot, PUSH, force)
+        add_three(to_spot, PUSH, times(force, -1.0))
         if frame > 0:
-            add(row(links, PER_LINK, frame), TWISTED, cross(apart, force))
+            add_three(row(links, PER_LINK, frame), TWISTED, cross(apart, force))
     return energy, power
 
 
 @lean
-def on_curve(curve_numbers_pointer, travel_or_rate):
+def curve_force(curve_numbers_pointer, travel_or_rate):
     """Force of a piecewise linear curve at an argument. ``curve_numbers_pointer`` points to the curve: count, offset,
     slope, then corners and changes of slope."""
     head = row(curve_numbers_pointer, 3, 0)
@@ -106,7 +106,7 @@ def on_curve(curve_numbers_pointer, travel_or_rate):
 
 
 def curve_numbers(curve: Curve) -> np.ndarray:
-    """Numbers of a piecewise linear force curve, in the order in which ``on_curve`` reads them."""
+    """Numbers of a piecewise linear force curve, in the order in which ``curve_force`` reads them."""
     offset, slope, corners, bends = curve.hinges()
     pairs = [value for pair in zip(corners, bends, strict=True) for value in pair]
     return np.array([3 + len(pairs), offset, slope, *pairs])

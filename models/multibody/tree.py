@@ -29,7 +29,7 @@ AHEAD, ASIDE, TURN, GROUND = 0, 1, 2, 3
 
 
 @lean
-def three(array, first_index):
+def three_from(array, first_index):
     """Three successive numbers of an array as a tuple."""
     return array[first_index], array[first_index + 1], array[first_index + 2]
 
@@ -59,13 +59,13 @@ def plus(a, b):
 
 
 @lean
-def put(array, first_index, added):
+def put_three(array, first_index, added):
     """Write a tuple into an array from index ``first_index`` on."""
     array[first_index], array[first_index + 1], array[first_index + 2] = added
 
 
 @lean
-def add(array, first_index, added):
+def add_three(array, first_index, added):
     """Add a tuple to three numbers of an array from index ``first_index`` on."""
     array[first_index] += added[0]
     array[first_index + 1] += added[1]
@@ -73,7 +73,7 @@ def add(array, first_index, added):
 
 
 @lean
-def outwards(joint_table, coordinate_count, q, v, links):
+def move_outwards(joint_table, coordinate_count, q, v, links):
     """Fill the links (motion of the bodies), body by body, from the table rows of ``joint_table``; their forces are set
     to zero. joint_table, links : pointers."""
     carrier = row(links, PER_LINK, 2)
@@ -92,31 +92,34 @@ def outwards(joint_table, coordinate_count, q, v, links):
 @lean
 def _fill_link(joint_table, first_joint, end_joint, parent_link, q, v, links):
     """Fill a body's link from its parent's link, and the axes of its coordinates, translations first."""
-    x, y, z = three(parent_link, TURNED), three(parent_link, TURNED + 3), three(parent_link, TURNED + 6)
+    x, y, z = three_from(parent_link, TURNED), three_from(parent_link, TURNED + 3), three_from(parent_link, TURNED + 6)
     place, speed = (
-        plus(three(parent_link, PLACE), out(parent_link, row(joint_table, PER_JOINT, first_joint), ARM)),
-        three(parent_link, SPEED),
+        plus(
+            three_from(parent_link, PLACE),
+            vector_in_carrier_axes(parent_link, row(joint_table, PER_JOINT, first_joint), ARM),
+        ),
+        three_from(parent_link, SPEED),
     )
-    turning = three(parent_link, TURNING)
+    turning = three_from(parent_link, TURNING)
     for j in range(first_joint, end_joint):
         kind = row(joint_table, PER_JOINT, j)[KIND]
         along = kind if kind < 3.0 else kind - 3.0
         axis = x if along == 0.0 else (y if along == 1.0 else z)
-        put(row(links, PER_LINK, j), AXIS, axis)
+        put_three(row(links, PER_LINK, j), AXIS, axis)
         if kind < 3.0:
             place, speed = plus(place, times(axis, q[j])), plus(speed, times(axis, v[j]))
         else:
             turning, speed = plus(turning, times(axis, v[j])), plus(speed, times(cross(place, axis), v[j]))
             x, y, z = _rotated_axes(along, x, y, z, math.cos(q[j]), math.sin(q[j]))
     link = row(links, PER_LINK, end_joint - 1)
-    put(link, TURNED, x)
-    put(link, TURNED + 3, y)
-    put(link, TURNED + 6, z)
-    put(link, PLACE, place)
-    put(link, SPEED, speed)
-    put(link, TURNING, turning)
-    put(link, PUSHED, (0.0, 0.0, 0.0))
-    put(link, TWISTED, (0.0, 0.0, 0.0))
+    put_three(link, TURNED, x)
+    put_three(link, TURNED + 3, y)
+    put_three(link, TURNED + 6, z)
+    put_three(link, PLACE, place)
+    put_three(link, SPEED, speed)
+    put_three(link, TURNING, turning)
+    put_three(link, PUSHED, (0.0, 0.0, 0.0))
+    put_three(link, TWISTED, (0.0, 0.0, 0.0))
 
 
 @lean
@@ -130,48 +133,48 @@ def _rotated_axes(axis_index, x, y, z, cosine, sine):
 
 
 @lean
-def out(link, first_component, first):
+def vector_in_carrier_axes(link, first_component, first):
     """Vector in the carrier's axes, from three components along a link's axes."""
     return plus(
         plus(
-            times(three(link, TURNED), first_component[first]),
-            times(three(link, TURNED + 3), first_component[first + 1]),
+            times(three_from(link, TURNED), first_component[first]),
+            times(three_from(link, TURNED + 3), first_component[first + 1]),
         ),
-        times(three(link, TURNED + 6), first_component[first + 2]),
+        times(three_from(link, TURNED + 6), first_component[first + 2]),
     )
 
 
 @lean
-def locate(point_table, point_count, links, force_points):
+def locate_points(point_table, point_count, links, force_points):
     """Fill the positions and velocities of all force points from the table rows of ``point_table``; their forces are
     set to zero. point_table, links, force_points : pointers."""
     for i in range(point_count):
         of, spot = row(point_table, PER_POINT, i), row(force_points, PER_SPOT, i)
         link = row(links, PER_LINK, int(of[JOINT]))
-        place = plus(three(link, PLACE), out(link, of, LOCAL))
-        put(spot, WHERE, place)
-        put(spot, RATE, plus(three(link, SPEED), cross(three(link, TURNING), place)))
-        put(spot, PUSH, (0.0, 0.0, 0.0))
+        place = plus(three_from(link, PLACE), vector_in_carrier_axes(link, of, LOCAL))
+        put_three(spot, WHERE, place)
+        put_three(spot, RATE, plus(three_from(link, SPEED), cross(three_from(link, TURNING), place)))
+        put_three(spot, PUSH, (0.0, 0.0, 0.0))
 
 
 @lean
-def push(link, carrier_wrench, force, position):
+def add_body_force(link, carrier_wrench, force, position):
     """Add an external force (N) at a position (m) to the body of a link, and to the carrier."""
-    twist(link, carrier_wrench, cross(position, force))
-    add(link, PUSHED, force)
+    add_body_moment(link, carrier_wrench, cross(position, force))
+    add_three(link, PUSHED, force)
     carrier_wrench[AHEAD] += force[0]
     carrier_wrench[ASIDE] += force[1]
 
 
 @lean
-def twist(link, carrier_wrench, moment):
+def add_body_moment(link, carrier_wrench, moment):
     """Add an external moment (N m) to the body of a link, and to the carrier."""
-    add(link, TWISTED, moment)
+    add_three(link, TWISTED, moment)
     carrier_wrench[TURN] += moment[2]
 
 
 @lean
-def inwards(joint_table, coordinate_count, point_table, point_count, body_tree, generalised_forces):
+def gather_forces_inwards(joint_table, coordinate_count, point_table, point_count, body_tree, generalised_forces):
     """Transfer forces at points and on bodies from the leaves of the tree to the carrier; adds the generalised force of
     each coordinate to ``generalised_forces``.
 
@@ -180,20 +183,20 @@ def inwards(joint_table, coordinate_count, point_table, point_count, body_tree, 
     links, spots = body_tree.links, body_tree.spots
     for i in range(point_count):
         spot, link = row(spots, PER_SPOT, i), row(links, PER_LINK, int(row(point_table, PER_POINT, i)[JOINT]))
-        force = three(spot, PUSH)
-        add(link, PUSHED, force)
-        add(link, TWISTED, cross(three(spot, WHERE), force))
+        force = three_from(spot, PUSH)
+        add_three(link, PUSHED, force)
+        add_three(link, TWISTED, cross(three_from(spot, WHERE), force))
     j = coordinate_count - 1
     while j > 2:
         of, link = row(joint_table, PER_JOINT, j), row(links, PER_LINK, j)
         first = j + 1 - int(of[COUNT])
         if of[KIND] != LOOSE:
-            pushed, twisted = three(link, PUSHED), three(link, TWISTED)
-            moment = plus(twisted, cross(pushed, three(link, PLACE)))
+            pushed, twisted = three_from(link, PUSHED), three_from(link, TWISTED)
+            moment = plus(twisted, cross(pushed, three_from(link, PLACE)))
             for k in range(first, j + 1):
                 turns = row(joint_table, PER_JOINT, k)[KIND] >= 3.0
-                generalised_forces[k] += dot(three(row(links, PER_LINK, k), AXIS), moment if turns else pushed)
+                generalised_forces[k] += dot(three_from(row(links, PER_LINK, k), AXIS), moment if turns else pushed)
             below = row(links, PER_LINK, int(row(joint_table, PER_JOINT, first)[BELOW]))
-            add(below, PUSHED, pushed)
-            add(below, TWISTED, twisted)
+            add_three(below, PUSHED, pushed)
+            add_three(below, TWISTED, twisted)
         j = first - 1

@@ -22,7 +22,7 @@ SOFT_BUILD = "mujoco"
 rigid."""
 
 
-class Motion(NamedTuple):
+class StateMotion(NamedTuple):
     """Mass matrix (n, n), forces (n,) and accelerations (n,) of a model at one state."""
 
     mass: np.ndarray
@@ -34,8 +34,8 @@ State = tuple[np.ndarray, np.ndarray]
 """Coordinates and rates (n,) of a model."""
 WHOLE_FRICTION_SHARE = 1.0 - 1e-12
 """Share of its full force from which a dry friction counts as sliding."""
-Equations = Callable[[np.ndarray, np.ndarray], Motion]
-"""Function that returns the motion (``Motion``) at coordinates and rates (n,)."""
+Equations = Callable[[np.ndarray, np.ndarray], StateMotion]
+"""Function that returns the motion (``StateMotion``) at coordinates and rates (n,)."""
 
 
 def equations_of_build(user_model: TwinModel, build_name: str) -> Equations:
@@ -43,18 +43,20 @@ def equations_of_build(user_model: TwinModel, build_name: str) -> Equations:
     MuJoCo, and rigid in the others."""
     built: Any = plain_tree(user_model) if build_name == PLAIN_BUILD else free_model(build_name, user_model.driven)
     rigid = user_model.driven.tied and build_name != SOFT_BUILD
-    terms = _constraint_rows(user_model, built.ties if build_name != PLAIN_BUILD else None) if rigid else None
+    terms = (
+        _constraint_jacobian_function(user_model, built.ties if build_name != PLAIN_BUILD else None) if rigid else None
+    )
 
-    def move(q: np.ndarray, v: np.ndarray) -> Motion:
+    def move(q: np.ndarray, v: np.ndarray) -> StateMotion:
         mass, force = built.mass_and_force(0.0, q, v)
         if terms is not None:
             force = constrained_forces(mass, force, *terms(q, v))
-        return Motion(mass, force, np.linalg.solve(mass, force))
+        return StateMotion(mass, force, np.linalg.solve(mass, force))
 
     return move
 
 
-def largest_gap(user_model: TwinModel, build_name: str, states: Sequence[State]) -> float:
+def largest_constraint_gap(user_model: TwinModel, build_name: str, states: Sequence[State]) -> float:
     """Largest violation (m or rad) of a build's constraints at the states. Comparing accelerations would not show it:
     bodies in wrong relative positions can have the same accelerations."""
     if not user_model.driven.tied:
@@ -66,7 +68,7 @@ def largest_gap(user_model: TwinModel, build_name: str, states: Sequence[State])
     return max(float(np.abs(built.gaps(q)).max(initial=0.0)) for q, _ in states)
 
 
-def _constraint_rows(
+def _constraint_jacobian_function(
     user_model: TwinModel, jacobian_at: JacobianAt | None
 ) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
     """Function that returns the constraint Jacobian J (c, n) and J' q' (c,) at a state, from plain equations or by
@@ -112,10 +114,10 @@ def equations_of_file(user_model: TwinModel) -> Equations:
     """Equations of motion of the file's model as MuJoCo parsed it."""
     data = mujoco.MjData(user_model.model)
 
-    def move(q: np.ndarray, v: np.ndarray) -> Motion:
+    def move(q: np.ndarray, v: np.ndarray) -> StateMotion:
         state = forward_state(user_model, data, q, v)
         mass, force = _mass_and_forces_of_file(user_model, data, state, data.qfrc_constraint)
-        return Motion(mass, force, np.linalg.solve(state.jacobian, data.qacc - state.bias))
+        return StateMotion(mass, force, np.linalg.solve(state.jacobian, data.qacc - state.bias))
 
     return move
 
@@ -123,15 +125,15 @@ def equations_of_file(user_model: TwinModel) -> Equations:
 def rigid_equations(user_model: TwinModel) -> Equations:
     """Equations of motion of the file's model as MuJoCo parsed it, with its equality constraints made rigid."""
     data = mujoco.MjData(user_model.model)
-    terms = _constraint_rows(
+    terms = _constraint_jacobian_function(
         user_model, lambda places: [_constraint_jacobian_of_file(user_model, data, q) for q in places]
     )
 
-    def move(q: np.ndarray, v: np.ndarray) -> Motion:
+    def move(q: np.ndarray, v: np.ndarray) -> StateMotion:
         rows, rest = terms(q, v)
         mass, force = _sliding_forces_of_file(user_model, data, q, v)
         force = constrained_forces(mass, force, rows, rest)
-        return Motion(mass, force, np.linalg.solve(mass, force))
+        return StateMotion(mass, force, np.linalg.solve(mass, force))
 
     return move
 
@@ -140,9 +142,9 @@ def sliding_equations(user_model: TwinModel) -> Equations:
     """Equations of motion of the file's model as MuJoCo parsed it, with dry friction by Coulomb's law."""
     data = mujoco.MjData(user_model.model)
 
-    def move(q: np.ndarray, v: np.ndarray) -> Motion:
+    def move(q: np.ndarray, v: np.ndarray) -> StateMotion:
         mass, force = _sliding_forces_of_file(user_model, data, q, v)
-        return Motion(mass, force, np.linalg.solve(mass, force))
+        return StateMotion(mass, force, np.linalg.solve(mass, force))
 
     return move
 

@@ -15,14 +15,14 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.own_model.car_bodies import CarBodies, car_bodies
-from models.own_model.car_joints import Roles, remove_elements_on, roles_of
+from models.own_model.car_joints import JointRoles, remove_elements_on, roles_of
 from models.own_model.content import CONTENT_KINDS, contents_of_model, limits_switched_off
-from models.own_model.file import check_sane, compiled_model
-from models.own_model.names import coordinate_of, label, moving_bodies
+from models.own_model.file import check_model_numbers, compiled_model
+from models.own_model.names import coordinate_of, moving_bodies, object_label
 from models.own_model.reading import body_loads, joint_elements, line_springs
 from models.own_model.wheel_sites import WheelSite, wheel_sites
-from models.own_model.xml_guard import Document, checked_document
-from models.vehicles.free_vehicle import CARRIER, SWAY, rotor
+from models.own_model.xml_guard import ModelXml, checked_document
+from models.vehicles.free_vehicle import CARRIER, SWAY, rotor_name
 from models.vehicles.spatial import (
     JointElement,
     PartOutput,
@@ -35,7 +35,7 @@ from models.vehicles.spatial import (
     TyreOutput,
     Vector,
 )
-from models.vehicles.spatial_linear import preloads
+from models.vehicles.spatial_linear import static_preloads
 from models.vehicles.vehicle_checks import check_vehicle
 
 CONTACT_CONTENT = "contact"
@@ -51,16 +51,16 @@ def vehicle_of_file(mjcf_path: Path) -> SpatialVehicle:
     if document.kind != "MJCF":
         raise InputError(mjcf_path.name, "", document.kind, "has no sites, by which wheels are known: save it as MJCF")
     model, _ = compiled_model(document)
-    check_sane(model, mjcf_path.name)
-    return _Reader(model, document).vehicle()
+    check_model_numbers(model, mjcf_path.name)
+    return _CarReader(model, document).vehicle()
 
 
 @dataclass
-class _Reader:
+class _CarReader:
     """Reader of one MJCF file, which collects the parts of the vehicle and notes about it."""
 
     model: mujoco.MjModel
-    document: Document
+    document: ModelXml
     notes: list[str] = field(default_factory=list)
     design: mujoco.MjData = field(init=False)
 
@@ -96,10 +96,10 @@ class _Reader:
     def _refuse(self, part_name: str, value: object, reason: str) -> NoReturn:
         raise InputError(self.document.path.name, part_name, value, reason)
 
-    def _leave_out(self, roles: Roles) -> None:
+    def _leave_out(self, roles: JointRoles) -> None:
         """Remove parts of the file that twinrig models in another way; refuse other parts without an equivalent."""
         acted = remove_elements_on(self.model, roles)
-        joints = [label(self.model, "joint", j) for j in (*roles.spin, *roles.steer)]
+        joints = [object_label(self.model, "joint", j) for j in (*roles.spin, *roles.steer)]
         for row in contents_of_model(self.model, self.document):
             if row.kind != CONTACT_CONTENT:
                 said = f"{row.line()}: a vehicle of a scene cannot have it"
@@ -125,7 +125,9 @@ class _Reader:
             self.notes.append(f"gravity is {GRAVITY:g} m/s^2, and not the file's {-gravity[2]:g}")
         for b in moving_bodies(self.model):
             if self.model.body_gravcomp[b]:
-                self._refuse(f"{label(self.model, 'body', b)} gravcomp", None, "must be 0: a vehicle has its weight")
+                self._refuse(
+                    f"{object_label(self.model, 'body', b)} gravcomp", None, "must be 0: a vehicle has its weight"
+                )
 
     def _elements(self, merged_bodies: CarBodies) -> Iterator[JointElement]:
         """Springs, dampers and rotor inertias along the coordinates of the suspension, with the signs of their axes."""
@@ -134,7 +136,7 @@ class _Reader:
             numbers = [joints[body] for body, _ in element.coordinates]
             for j in numbers:
                 if j not in merged_bodies.coordinates:
-                    said = f"acts along {label(self.model, 'joint', j)}, which twinrig moves, and along others"
+                    said = f"acts along {object_label(self.model, 'joint', j)}, which twinrig moves, and along others"
                     self._refuse(element.name, None, said)
             moved = [merged_bodies.coordinates[j] for j in numbers]
             factors = tuple(factor * sign for factor, (_, sign) in zip(element.factors, moved, strict=True))
@@ -167,7 +169,7 @@ class _Reader:
     def _without_preloads(self, vehicle: SpatialVehicle) -> SpatialVehicle:
         """The vehicle without preloads, since its springs will get the preloads that balance its weight. A note lists
         where the file's preloads differ."""
-        held = preloads(replace(vehicle, gravity=GRAVITY)).parts
+        held = static_preloads(replace(vehicle, gravity=GRAVITY)).parts
         changed = [
             f"{e.name} {held[e.name]:.4g} for {e.preload:.4g}"
             for e in vehicle.joint_elements
@@ -182,7 +184,7 @@ class _Reader:
 
 def _reserved_names(wheels: tuple[WheelSite, ...]) -> set[str]:
     """Names of bodies that a system adds to a car, so that the file's bodies cannot have them."""
-    return {CARRIER, SWAY, *(rotor(wheel.name) for wheel in wheels)}
+    return {CARRIER, SWAY, *(rotor_name(wheel.name) for wheel in wheels)}
 
 
 def _tyre(wheel: WheelSite, merged_bodies: CarBodies) -> Tyre:

@@ -12,11 +12,11 @@ import mujoco
 import numpy as np
 
 from models.core.errors import InputError
-from models.own_model.car_joints import Roles, freedom_of, joint_text, joints_of
+from models.own_model.car_joints import JointRoles, freedom_of, joint_text, joints_of
 from models.own_model.names import moving_bodies
 from models.own_model.wheel_sites import SAME_AXLE_DISTANCE, WheelSite
-from models.own_model.xml_guard import Document
-from models.vehicles.spatial import FREEDOMS, Body, Freedom, Vector, steiner
+from models.own_model.xml_guard import ModelXml
+from models.vehicles.spatial import FREEDOMS, Body, Freedom, Vector, point_mass_inertia
 
 REVOLUTION_TOLERANCE = 1e-9
 """Share of a wheel's inertia by which it may differ from the inertia of a body of revolution about its axle."""
@@ -24,7 +24,7 @@ CENTRE_TOLERANCE = 1e-12
 """Distance (m) up to which a hinge counts as being in a body's centre of mass."""
 
 
-class Mass(NamedTuple):
+class MassProperties(NamedTuple):
     """Mass properties of a rigid body: mass (kg), centre (3,) in the design position (m), inertia (3, 3) about it in
     the vehicle's axes (kg m^2)."""
 
@@ -80,8 +80,8 @@ class _JointSegment:
 def car_bodies(
     mujoco_model: mujoco.MjModel,
     design_data: mujoco.MjData,
-    roles: Roles,
-    model_xml: Document,
+    roles: JointRoles,
+    model_xml: ModelXml,
     reserved_names: Collection[str],
 ) -> CarBodies:
     """Bodies of a car from an MJCF model. Raises InputError for joints with oblique axes, and for wheels with
@@ -89,18 +89,18 @@ def car_bodies(
 
     design_data : data of the model in the design position, with kinematics computed; reserved_names : names for other
     bodies."""
-    return _Builder(mujoco_model, design_data, roles, model_xml, reserved_names).build()
+    return _CarBuilder(mujoco_model, design_data, roles, model_xml, reserved_names).build()
 
 
-class _Builder:
+class _CarBuilder:
     """Merges the bodies of one MJCF file into the bodies of the description."""
 
     def __init__(
         self,
         mujoco_model: mujoco.MjModel,
         design_data: mujoco.MjData,
-        roles: Roles,
-        model_xml: Document,
+        roles: JointRoles,
+        model_xml: ModelXml,
         reserved_names: Collection[str],
     ) -> None:
         self.model, self.design, self.roles, self.document, self.reserved = (
@@ -116,7 +116,7 @@ class _Builder:
             joined = b in roles.chassis[1:] or (above is not None and not self._suspension_joints(b))
             self.leaders[b] = above if joined and above is not None else b
         self.spin_inertia = dict[str, float]()
-        self.masses: dict[int, list[Mass]] = {leader: [] for leader in self.leaders.values()}
+        self.masses: dict[int, list[MassProperties]] = {leader: [] for leader in self.leaders.values()}
         spinning = self._spinning_bodies()
         for b, leader in self.leaders.items():
             if b not in spinning:
@@ -150,10 +150,10 @@ class _Builder:
         name: str = self.model.body(body).name or f"body {body}"
         return f"{name} of the file" if name in self.reserved else name
 
-    def _mass(self, body: int) -> Mass:
+    def _mass(self, body: int) -> MassProperties:
         axes = self.design.ximat[body].reshape(3, 3)
         inertia = axes * self.model.body_inertia[body] @ axes.T
-        return Mass(float(self.model.body_mass[body]), self.design.xipos[body].copy(), inertia)
+        return MassProperties(float(self.model.body_mass[body]), self.design.xipos[body].copy(), inertia)
 
     def _spinning_bodies(self) -> set[int]:
         """Bodies that spin with the wheels, by number. Their inertia about the axle is removed from the masses, because
@@ -180,7 +180,7 @@ class _Builder:
             body = int(self.model.body_parentid[body])
         return body == carrier
 
-    def _check_round(self, mass_properties: Mass, wheel: WheelSite, joint: int) -> None:
+    def _check_round(self, mass_properties: MassProperties, wheel: WheelSite, joint: int) -> None:
         """Refuse a wheel with imbalance, which would shake as it spins."""
         inertia, beside = mass_properties.inertia, np.abs((mass_properties.centre - wheel.point)[[0, 2]]).max()
         uneven = np.abs([inertia[0, 0] - inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]]).max()
@@ -207,22 +207,22 @@ class _Builder:
         return segments
 
 
-def combined_mass(masses: list[Mass]) -> Mass:
+def combined_mass(masses: list[MassProperties]) -> MassProperties:
     """Mass, centre and inertia of a rigid body that consists of all the given ones."""
     if len(masses) == 1:
         return masses[0]
     total = sum(each.mass for each in masses)
     shares = [each.mass / total if total else 1.0 / len(masses) for each in masses]
     centre = np.sum([share * each.centre for share, each in zip(shares, masses, strict=True)], axis=0)
-    inertia = np.sum([each.inertia + steiner(each.mass, each.centre - centre) for each in masses], axis=0)
-    return Mass(total, centre, inertia)
+    inertia = np.sum([each.inertia + point_mass_inertia(each.mass, each.centre - centre) for each in masses], axis=0)
+    return MassProperties(total, centre, inertia)
 
 
 def _bodies_of_joints(
     body_name: str,
     carrier_name: str,
     segments: list[_JointSegment],
-    mass_properties: Mass,
+    mass_properties: MassProperties,
     joint_coordinates: dict[int, tuple[tuple[str, Freedom], float]],
 ) -> Iterator[Body]:
     """Bodies of the description for one body of the file and its joints; fills ``joint_coordinates`` with the names
@@ -247,7 +247,7 @@ def _bodies_of_joints(
 
 
 def _body_from_segment(
-    body_name: str, mass_properties: Mass, freedoms: tuple[Freedom, ...], parent_name: str | None
+    body_name: str, mass_properties: MassProperties, freedoms: tuple[Freedom, ...], parent_name: str | None
 ) -> Body:
     x, y, z = map(_vector_of, mass_properties.inertia)
     return Body(body_name, mass_properties.mass, _vector_of(mass_properties.centre), freedoms, (x, y, z), parent_name)

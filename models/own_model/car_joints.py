@@ -11,10 +11,10 @@ import numpy as np
 from models.core.errors import InputError
 from models.own_model.content import BIAS, DSBL, GAIN, JOINT_TARGETS, TRN
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
-from models.own_model.names import label, moving_bodies
+from models.own_model.names import moving_bodies, object_label
 from models.own_model.reading import is_fixed, tendon_travel
 from models.own_model.wheel_sites import SAME_AXLE_DISTANCE, WheelSite, site_text
-from models.own_model.xml_guard import Document
+from models.own_model.xml_guard import ModelXml
 from models.vehicles.spatial import FREEDOMS, Freedom
 
 PARALLEL_TOLERANCE = 1e-9
@@ -24,7 +24,7 @@ NEGLIGIBLE_MASS = 1e-6
 
 
 @dataclass(frozen=True)
-class Roles:
+class JointRoles:
     """Roles of the joints of a car. chassis : numbers of its bodies; spin, steer : for each joint that spins or steers
     a wheel, the site of that wheel."""
 
@@ -50,8 +50,8 @@ def freedom_of(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, joint: 
 
 
 def roles_of(
-    mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, wheels: tuple[WheelSite, ...], model_xml: Document
-) -> Roles:
+    mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, wheels: tuple[WheelSite, ...], model_xml: ModelXml
+) -> JointRoles:
     """Roles of all joints of a car. Raises InputError where no chassis is free, or a wheel turns in a way that twinrig
     does not have."""
     chassis = _chassis_bodies(mujoco_model, design_data, model_xml)
@@ -63,16 +63,16 @@ def roles_of(
             if (freedom := freedom_of(mujoco_model, design_data, joint)) is not None and freedom[0] == "rz":
                 _check_steering(mujoco_model, design_data, joint, wheel, model_xml)
                 steer[joint] = wheel
-    return Roles(chassis, spin, steer)
+    return JointRoles(chassis, spin, steer)
 
 
-def joint_text(mujoco_model: mujoco.MjModel, model_xml: Document, joint: int) -> str:
+def joint_text(mujoco_model: mujoco.MjModel, model_xml: ModelXml, joint: int) -> str:
     """Text by which messages name a joint."""
     line = model_xml.line(("joint", "freejoint"), mujoco_model.joint(joint).name)
-    return label(mujoco_model, "joint", joint) + (f" ({line})" if line else "")
+    return object_label(mujoco_model, "joint", joint) + (f" ({line})" if line else "")
 
 
-def _chassis_bodies(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, model_xml: Document) -> tuple[int, ...]:
+def _chassis_bodies(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, model_xml: ModelXml) -> tuple[int, ...]:
     """Numbers of the bodies from the ground to the one that completes all six freedoms of the chassis; those before it
     are almost massless."""
     numbers, name = moving_bodies(mujoco_model), model_xml.path.name
@@ -95,7 +95,7 @@ def _chassis_bodies(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, mo
         body = riders[0]
     if sorted(freedoms) != sorted(FREEDOMS):
         said = "the chassis must be free: give it a <freejoint/>, or three slides and three hinges along x, y and z"
-        raise InputError(name, label(mujoco_model, "body", body), None, said)
+        raise InputError(name, object_label(mujoco_model, "body", body), None, said)
     _check_without_forces(
         mujoco_model, [j for b in bodies for j in joints_of(mujoco_model, b)], model_xml, "the chassis"
     )
@@ -112,7 +112,7 @@ def _joints_to_ground(mujoco_model: mujoco.MjModel, body: int, chassis: tuple[in
 
 
 def _spin_hinge(
-    mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, wheel: WheelSite, model_xml: Document
+    mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, wheel: WheelSite, model_xml: ModelXml
 ) -> int | None:
     """Number of the hinge about y through a wheel's centre, on the wheel's body or on a body that it carries; None if
     there is none."""
@@ -135,7 +135,7 @@ def _spin_hinge(
 
 
 def _check_without_forces(
-    mujoco_model: mujoco.MjModel, joints: list[int], model_xml: Document, owner_text: str
+    mujoco_model: mujoco.MjModel, joints: list[int], model_xml: ModelXml, owner_text: str
 ) -> None:
     """Refuse springs, dampers, rotors and dry friction on joints that twinrig models in another way."""
     for joint in joints:
@@ -156,7 +156,7 @@ def _check_without_forces(
 
 
 def _check_steering(
-    mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, joint: int, wheel: WheelSite, model_xml: Document
+    mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, joint: int, wheel: WheelSite, model_xml: ModelXml
 ) -> None:
     """Refuse steering other than that of the front wheels about the vertical through their centres."""
     beside = round(float(np.linalg.norm((design_data.xanchor[joint] - wheel.point)[:2])), 9)
@@ -170,7 +170,7 @@ def _check_steering(
         raise InputError(model_xml.path.name, where, beside, said)
 
 
-def remove_elements_on(mujoco_model: mujoco.MjModel, roles: Roles) -> list[str]:
+def remove_elements_on(mujoco_model: mujoco.MjModel, roles: JointRoles) -> list[str]:
     """Remove from the model all elements that act on the joints for spin or steering; returns their names."""
     moved, names = {*roles.spin, *roles.steer}, list[str]()
     for joint in roles.steer:
@@ -189,7 +189,7 @@ def remove_elements_on(mujoco_model: mujoco.MjModel, roles: Roles) -> list[str]:
     for t in tendons:
         mujoco_model.tendon_stiffness[t] = mujoco_model.tendon_damping[t] = mujoco_model.tendon_armature[t] = 0.0
         mujoco_model.tendon_frictionloss[t] = mujoco_model.tendon_limited[t] = mujoco_model.tendon_actfrclimited[t] = 0
-        names.append(label(mujoco_model, "tendon", t))
+        names.append(object_label(mujoco_model, "tendon", t))
     names += _forget_actuators(mujoco_model, moved, tendons)
     if not mujoco_model.opt.disableflags & int(DSBL.mjDSBL_EQUALITY):
         names += _forget_equalities(mujoco_model, moved, tendons)
@@ -212,7 +212,7 @@ def _forget_actuators(mujoco_model: mujoco.MjModel, joints: set[int], tendons: s
             mujoco_model.actuator_damping[i] = mujoco_model.actuator_armature[i] = mujoco_model.actuator_forcelimited[
                 i
             ] = 0
-            names.append(label(mujoco_model, "actuator", i))
+            names.append(object_label(mujoco_model, "actuator", i))
     return names
 
 
@@ -226,5 +226,5 @@ def _forget_equalities(mujoco_model: mujoco.MjModel, joints: set[int], tendons: 
         )
         if pair <= of:
             mujoco_model.eq_active0[e] = 0
-            names.append(label(mujoco_model, "equality", e))
+            names.append(object_label(mujoco_model, "equality", e))
     return names

@@ -19,12 +19,12 @@ from models.own_model.builds import (
     PLAIN_BUILD,
     SOFT_BUILD,
     Equations,
-    Motion,
     State,
+    StateMotion,
     equations_of_build,
     expected_equations,
     is_soft_in_mujoco,
-    largest_gap,
+    largest_constraint_gap,
     moving_friction_states,
     sliding_states,
 )
@@ -58,15 +58,15 @@ Progress = Callable[[float], object]
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
+class MotionReference:
     """Motion of the file's model in MuJoCo as the reference for the builds: names of coordinates (n,), for each the
     slice of coordinates that are judged together with it (n,), its motion at some states, and the sensitivity of this
     motion to rounding."""
 
     names: tuple[str, ...]
     judged_together: tuple[slice, ...]
-    motions: list[Motion]
-    sensitivities: list[Motion]
+    motions: list[StateMotion]
+    sensitivities: list[StateMotion]
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def certificate(
         row = agreement_of_build(
             build, soft if build == SOFT_BUILD else rigid, motion_at(equations_of_build(user_model, build), states)
         )
-        rows.append(replace(row, gap=largest_gap(user_model, build, states)))
+        rows.append(replace(row, gap=largest_constraint_gap(user_model, build, states)))
         report_progress((i + 1) / len(ALL_BUILDS))
     return tuple(rows)
 
@@ -148,13 +148,13 @@ def softness_difference(user_model: TwinModel, state_count: int) -> float:
     ).acceleration
 
 
-def reference_of_file(user_model: TwinModel, states: Sequence[State], build_name: str) -> Reference:
+def reference_of_file(user_model: TwinModel, states: Sequence[State], build_name: str) -> MotionReference:
     """``Reference`` for a build from the file's model in MuJoCo at some states. Raises RunFailed as ``motion_at``
     does."""
     law = partial(expected_equations, build_name=build_name)
     moved = motion_at(law(user_model), states)
     _check_inertia(user_model, moved[0].mass)
-    return Reference(
+    return MotionReference(
         user_model.names,
         joint_coordinate_slices(user_model.model),
         moved,
@@ -177,7 +177,7 @@ def _check_inertia(user_model: TwinModel, mass_matrix: np.ndarray) -> None:
         raise RunFailed(user_model.name, f"the mass matrix is singular: {' and '.join(names)} can move without inertia")
 
 
-def motion_at(equations: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Motion]:
+def motion_at(equations: Equations, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[StateMotion]:
     """Mass matrix, forces and accelerations at all states. Raises RunFailed where a mass matrix is singular or an
     acceleration is not finite."""
     try:
@@ -190,11 +190,13 @@ def motion_at(equations: Equations, states: Sequence[tuple[np.ndarray, np.ndarra
     return moved
 
 
-def agreement_of_build(build_name: str, expected_reference: Reference, motions: Sequence[Motion]) -> Agreement:
+def agreement_of_build(
+    build_name: str, expected_reference: MotionReference, motions: Sequence[StateMotion]
+) -> Agreement:
     """Largest differences between the motions of a build and the reference over all states."""
     rows = [_scales_at_state(expected_reference, i) for i in range(len(motions))]
-    magnitudes, rounding = (Motion(*map(np.array, zip(*each, strict=True))) for each in zip(*rows, strict=True))
-    apart = Motion(
+    magnitudes, rounding = (StateMotion(*map(np.array, zip(*each, strict=True))) for each in zip(*rows, strict=True))
+    apart = StateMotion(
         *(
             np.abs(np.array(there) - np.array(here))
             for there, here in _paired_values(motions, expected_reference.motions)
@@ -218,7 +220,7 @@ def agreement_of_build(build_name: str, expected_reference: Reference, motions: 
     )
 
 
-def _may_be_rounding(magnitudes: Motion, allowed_rounding: np.ndarray) -> float:
+def _may_be_rounding(magnitudes: StateMotion, allowed_rounding: np.ndarray) -> float:
     """Largest ratio, over the coordinates, of the allowed rounding (s, n) to the largest acceleration, limited to 1e-10
     to 1; coordinates that hardly move are left out."""
     largest, allowed = magnitudes.acceleration.max(axis=0), allowed_rounding.max(axis=0)
@@ -228,7 +230,7 @@ def _may_be_rounding(magnitudes: Motion, allowed_rounding: np.ndarray) -> float:
 
 
 def _paired_values(
-    build_motions: Sequence[Motion], expected_motions: Sequence[Motion]
+    build_motions: Sequence[StateMotion], expected_motions: Sequence[StateMotion]
 ) -> Iterator[tuple[tuple, tuple]]:
     """Pairs of a build's and the expected values over all states: first mass matrices, then forces, then
     accelerations."""
@@ -239,7 +241,7 @@ def _largest_difference(relative_differences: np.ndarray) -> float:
     return float(relative_differences.max()) if np.isfinite(relative_differences).all() else np.inf
 
 
-def _scales_at_state(expected_reference: Reference, state_index: int) -> tuple[Motion, Motion]:
+def _scales_at_state(expected_reference: MotionReference, state_index: int) -> tuple[StateMotion, StateMotion]:
     """Reference magnitudes of masses, forces and accelerations at one state, and the rounding error allowed in each.
 
     The allowed error does not grow further where a mass matrix is nearly singular.
@@ -248,9 +250,9 @@ def _scales_at_state(expected_reference: Reference, state_index: int) -> tuple[M
     inertia = np.sqrt(np.maximum(moved.mass.diagonal(), 0.0))
     force, acceleration = (np.abs(each) for each in (moved.force, moved.acceleration))
     acceleration = np.array([acceleration[together].max() for together in expected_reference.judged_together])
-    magnitudes = Motion(np.outer(inertia, inertia), force, acceleration)
+    magnitudes = StateMotion(np.outer(inertia, inertia), force, acceleration)
     allowed = ROUNDING_SHARE * min(1.0, WORST_CONDITION / _scaled_condition(moved.mass))
-    return magnitudes, Motion(*(allowed * each for each in sensitive))
+    return magnitudes, StateMotion(*(allowed * each for each in sensitive))
 
 
 def _scaled_condition(mass_matrix: np.ndarray) -> float:

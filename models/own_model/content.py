@@ -15,7 +15,7 @@ from models.core.errors import InputError
 from models.engines.native_mujoco import SOLVER_TOLERANCE
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT
 from models.own_model.equalities import couples_joints, joins_bodies
-from models.own_model.names import feature_is_disabled, first_names_text, label, name_of
+from models.own_model.names import feature_is_disabled, first_names_text, object_label, object_name
 from models.own_model.reading import (
     JOINT_TARGETS,
     affine_law,
@@ -25,7 +25,7 @@ from models.own_model.reading import (
     is_line,
     pushes_site,
 )
-from models.own_model.xml_guard import Document
+from models.own_model.xml_guard import ModelXml
 
 DSBL, TRN, GAIN, BIAS = mujoco.mjtDisableBit, mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias
 PLAIN_ACTUATORS = ("motor", "position", "velocity", "general", "damper")
@@ -45,7 +45,7 @@ AFFINE_BIASES = (int(BIAS.mjBIAS_NONE), int(BIAS.mjBIAS_AFFINE))
 
 
 @dataclass(frozen=True)
-class Content:
+class FileContent:
     """Content of a file that needs attention. kind : its name for ``--without``; names : of the elements concerned,
     with "FILE:LINE" where known; reason : why other builds cannot represent it."""
 
@@ -58,12 +58,12 @@ class Content:
         return f"{self.kind}: {first_names_text(self.names)}: {self.reason}"
 
 
-def contents_of_model(mujoco_model: mujoco.MjModel, model_xml: Document) -> list[Content]:
+def contents_of_model(mujoco_model: mujoco.MjModel, model_xml: ModelXml) -> list[FileContent]:
     """All content of the model beyond a tree with linear force laws, one item for each kind that occurs."""
     return _contents_of_kind(mujoco_model, model_xml, lambda kind, what, number: True)
 
 
-def without_equal(mujoco_model: mujoco.MjModel, model_xml: Document) -> list[Content]:
+def without_equal(mujoco_model: mujoco.MjModel, model_xml: ModelXml) -> list[FileContent]:
     """The content of ``contents_of_model`` that other builds cannot represent."""
     return _contents_of_kind(
         mujoco_model, model_xml, lambda kind, what, number: not _has_equal(mujoco_model, kind, what, number)
@@ -71,14 +71,14 @@ def without_equal(mujoco_model: mujoco.MjModel, model_xml: Document) -> list[Con
 
 
 def _contents_of_kind(
-    mujoco_model: mujoco.MjModel, model_xml: Document, is_wanted: Callable[[str, str, int], bool]
-) -> list[Content]:
-    rows = list[Content]()
+    mujoco_model: mujoco.MjModel, model_xml: ModelXml, is_wanted: Callable[[str, str, int], bool]
+) -> list[FileContent]:
+    rows = list[FileContent]()
     for kind, (listed, why, _) in CONTENT_KINDS.items():
         if names := [
             _with_line(mujoco_model, model_xml, *each) for each in listed(mujoco_model) if is_wanted(kind, *each)
         ]:
-            rows.append(Content(kind, tuple(names), why))
+            rows.append(FileContent(kind, tuple(names), why))
     return rows
 
 
@@ -95,8 +95,8 @@ def _has_equal(mujoco_model: mujoco.MjModel, content_kind: str, object_kind: str
 
 
 def check_and_leave_out(
-    mujoco_model: mujoco.MjModel, model_xml: Document, left_out_kinds: Collection[str]
-) -> list[Content]:
+    mujoco_model: mujoco.MjModel, model_xml: ModelXml, left_out_kinds: Collection[str]
+) -> list[FileContent]:
     """Remove the kinds of content named in ``left_out_kinds`` from the model, and return what was removed. Raises
     InputError where other content cannot be represented."""
     for kind in left_out_kinds:
@@ -119,7 +119,7 @@ def check_and_leave_out(
     return left_out
 
 
-def _refusal(contents: Sequence[Content], left_out_kinds: Collection[str]) -> str:
+def _refusal(contents: Sequence[FileContent], left_out_kinds: Collection[str]) -> str:
     """Text of a refusal: the content without an equivalent, and the option that leaves all of it out;
     left_out_kinds : kinds left out already."""
     told = ". ".join(row.line() for row in contents)
@@ -132,15 +132,15 @@ def _refusal(contents: Sequence[Content], left_out_kinds: Collection[str]) -> st
     return f"{told}. {subject_and_verb} no equal in the other builds; leave {pronoun} out with `--without {kinds}`"
 
 
-def _with_line(mujoco_model: mujoco.MjModel, model_xml: Document, object_kind: str, object_index: int) -> str:
+def _with_line(mujoco_model: mujoco.MjModel, model_xml: ModelXml, object_kind: str, object_index: int) -> str:
     if object_index == NAMELESS_INDEX:
         return object_kind
-    name = name_of(mujoco_model, object_kind, object_index)
+    name = object_name(mujoco_model, object_kind, object_index)
     line = model_xml.line(TAGS_OF_ELEMENT.get(object_kind, ()), name) if name else ""
     return (
-        f"{label(mujoco_model, object_kind, object_index)} ({line})"
+        f"{object_label(mujoco_model, object_kind, object_index)} ({line})"
         if line
-        else label(mujoco_model, object_kind, object_index)
+        else object_label(mujoco_model, object_kind, object_index)
     )
 
 
@@ -241,7 +241,7 @@ def _has_rotor(mujoco_model: mujoco.MjModel, joint: int) -> bool:
     )
 
 
-def _bent_laws(mujoco_model: mujoco.MjModel) -> ObjectIterator:
+def _nonlinear_laws(mujoco_model: mujoco.MjModel) -> ObjectIterator:
     for j in range(mujoco_model.njnt):
         bent = mujoco_model.jnt_stiffnesspoly[j].any() or mujoco_model.dof_dampingpoly[mujoco_model.jnt_dofadr[j]].any()
         if bent or (mujoco_model.nplastic and mujoco_model.jnt_plasticadr[j] >= 0):
@@ -355,7 +355,7 @@ CONTENT_KINDS: dict[str, tuple[Callable[[mujoco.MjModel], ObjectIterator], str, 
         "a rotor of a ball joint, or what turns it or a free one back",
         _forget_turning_laws,
     ),
-    "bent_law": (_bent_laws, "a stiffness or damping that is no constant", _forget_bent_laws),
+    "bent_law": (_nonlinear_laws, "a stiffness or damping that is no constant", _forget_bent_laws),
     "gravity_compensation": (
         _partly_compensated_bodies,
         "weight that is compensated at some joints alone, since others leave that to actuators, which are off",
@@ -370,5 +370,5 @@ that removes it."""
 
 def limits_switched_off(mujoco_model: mujoco.MjModel) -> list[str]:
     """Names of the joints and tendons whose limits were switched off."""
-    joints = [label(mujoco_model, "joint", int(j)) for j in np.flatnonzero(mujoco_model.jnt_limited)]
-    return joints + [label(mujoco_model, "tendon", int(t)) for t in np.flatnonzero(mujoco_model.tendon_limited)]
+    joints = [object_label(mujoco_model, "joint", int(j)) for j in np.flatnonzero(mujoco_model.jnt_limited)]
+    return joints + [object_label(mujoco_model, "tendon", int(t)) for t in np.flatnonzero(mujoco_model.tendon_limited)]

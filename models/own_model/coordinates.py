@@ -39,7 +39,7 @@ class QuaternionJoint:
     free: bool
 
 
-class Coordinates:
+class ModelCoordinates:
     """Coordinates of one model, in the order of MuJoCo's degrees of freedom, and their conversion to MuJoCo's state."""
 
     def __init__(self, mujoco_model: mujoco.MjModel, design_data: mujoco.MjData) -> None:

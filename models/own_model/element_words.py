@@ -11,7 +11,7 @@ import numpy as np
 
 from models.own_model.coordinates import SLIDE_JOINT
 from models.own_model.equalities import couples_joints, is_between_sites, joins_bodies
-from models.own_model.names import feature_is_disabled, label
+from models.own_model.names import feature_is_disabled, object_label
 from models.own_model.reading import (
     JOINT_TARGETS,
     LAST_GROUP,
@@ -44,10 +44,10 @@ def _refusing_writer(property_name: str) -> Writer:
 
 
 def _index_of_name(mujoco_model: mujoco.MjModel, object_kind: str, object_name: str) -> int:
-    """Index of the joint, body or tendon with the name that ``label`` gives; ValueError if there is none."""
+    """Index of the joint, body or tendon with the name that ``object_label`` gives; ValueError if there is none."""
     count = {"joint": mujoco_model.njnt, "body": mujoco_model.nbody, "tendon": mujoco_model.ntendon}[object_kind]
     for number in range(count):
-        if label(mujoco_model, object_kind, number) == object_name:
+        if object_label(mujoco_model, object_kind, number) == object_name:
             return number
     raise ValueError(f"no {object_name}")
 
@@ -93,7 +93,7 @@ def _read_parent(mujoco_model: mujoco.MjModel, joint: int) -> np.ndarray:
     """Name of the joint before a joint on the path from the world."""
     body = int(mujoco_model.jnt_bodyid[joint])
     if joint > mujoco_model.body_jntadr[body]:
-        return _word_value(label(mujoco_model, "joint", joint - 1))
+        return _word_value(object_label(mujoco_model, "joint", joint - 1))
     return _moved_by(mujoco_model, int(mujoco_model.body_parentid[body]))
 
 
@@ -102,13 +102,15 @@ def _moved_by(mujoco_model: mujoco.MjModel, body: int) -> np.ndarray:
     while body and not mujoco_model.body_jntnum[body]:
         body = int(mujoco_model.body_parentid[body])
     last = int(mujoco_model.body_jntadr[body] + mujoco_model.body_jntnum[body] - 1)
-    return _word_value(label(mujoco_model, "joint", last) if body else WORLD_BODY)
+    return _word_value(object_label(mujoco_model, "joint", last) if body else WORLD_BODY)
 
 
 def _read_attachment(mujoco_model: mujoco.MjModel, tendon: int) -> np.ndarray:
     """Names of the joints of a fixed tendon, or of the bodies at both ends of a straight one."""
     if is_fixed(mujoco_model, tendon):
-        return _word_value(", ".join(label(mujoco_model, "joint", j) for j in tendon_travel(mujoco_model, tendon)[0]))
+        return _word_value(
+            ", ".join(object_label(mujoco_model, "joint", j) for j in tendon_travel(mujoco_model, tendon)[0])
+        )
     if is_line(mujoco_model, tendon):
         return _word_value(", ".join(_body_of(mujoco_model, site) for site in sites_of(mujoco_model, tendon)))
     return np.zeros(0)
@@ -125,7 +127,7 @@ def _write_attachment(mujoco_model: mujoco.MjModel, tendon: int, new_value: np.n
 
 def _body_of(mujoco_model: mujoco.MjModel, site: int) -> str:
     body = int(mujoco_model.site_bodyid[site])
-    return label(mujoco_model, "body", body) if body else WORLD_BODY
+    return object_label(mujoco_model, "body", body) if body else WORLD_BODY
 
 
 def _read_target(mujoco_model: mujoco.MjModel, actuator: int) -> np.ndarray:
@@ -134,9 +136,9 @@ def _read_target(mujoco_model: mujoco.MjModel, actuator: int) -> np.ndarray:
     if pushes_site(mujoco_model, actuator):
         return _word_value(f"a site of {_body_of(mujoco_model, target)}")
     if int(mujoco_model.actuator_trntype[actuator]) in JOINT_TARGETS:
-        return _word_value(label(mujoco_model, "joint", target))
+        return _word_value(object_label(mujoco_model, "joint", target))
     tendon = mujoco_model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_TENDON
-    return _word_value(label(mujoco_model, "tendon", target)) if tendon else np.zeros(0)
+    return _word_value(object_label(mujoco_model, "tendon", target)) if tendon else np.zeros(0)
 
 
 def _write_target(mujoco_model: mujoco.MjModel, actuator: int, new_value: np.ndarray) -> None:
@@ -150,13 +152,13 @@ def _read_partners(mujoco_model: mujoco.MjModel, equality: int) -> np.ndarray:
     """Names of the joints or bodies that an equality constraint connects."""
     things = [int(mujoco_model.eq_obj1id[equality]), int(mujoco_model.eq_obj2id[equality])]
     if couples_joints(mujoco_model, equality):
-        return _word_value(" and ".join(label(mujoco_model, "joint", j) for j in things if j >= 0))
+        return _word_value(" and ".join(object_label(mujoco_model, "joint", j) for j in things if j >= 0))
     if not joins_bodies(mujoco_model, equality):
         return np.zeros(0)
     bodies = [
         _body_of(mujoco_model, s)
         if is_between_sites(mujoco_model, equality)
-        else label(mujoco_model, "body", s)
+        else object_label(mujoco_model, "body", s)
         if s
         else WORLD_BODY
         for s in things

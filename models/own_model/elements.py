@@ -14,7 +14,7 @@ import numpy as np
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, SLIDE_JOINT
 from models.own_model.element_words import WORD_ELEMENTS
 from models.own_model.equalities import CONNECT_EQUALITY, couples_joints, is_between_sites, joins_bodies
-from models.own_model.names import feature_is_disabled, label
+from models.own_model.names import feature_is_disabled, object_label
 from models.own_model.reading import is_line, pushes_site, sites_of
 
 AFFINE_LAW, CONSTANT_LAW = int(mujoco.mjtGain.mjGAIN_AFFINE), int(mujoco.mjtGain.mjGAIN_FIXED)
@@ -26,7 +26,7 @@ SHOWN_DIGITS, EXACT_DIGITS = 6, 17
 
 
 @dataclass(frozen=True, eq=False)
-class Element:
+class ModelProperty:
     """Property of a part of a model. kind, owner : as in "armature of joint 'hip'"; unit; value : its numbers (k,), or
     one word."""
 
@@ -50,7 +50,7 @@ class Element:
         """The value with its unit as text."""
         return value_text(self.value, self.unit)
 
-    def has_same_value(self, other_element: "Element") -> bool:
+    def has_same_value(self, other_element: "ModelProperty") -> bool:
         """Whether this and another property have the same value."""
         if is_word(self.value) or is_word(other_element.value):
             return bool(np.array_equal(self.value, other_element.value))
@@ -107,12 +107,12 @@ class _PropertyKind:
     write: Callable[[mujoco.MjModel, int, np.ndarray], None]
 
 
-def elements_of_model(mujoco_model: mujoco.MjModel) -> dict[tuple[str, str], Element]:
+def elements_of_model(mujoco_model: mujoco.MjModel) -> dict[tuple[str, str], ModelProperty]:
     """All properties of a model, by kind and owner, in the order of the model."""
     return {each.key: each for each in _elements_of_kind(mujoco_model)}
 
 
-def set_value(mujoco_model: mujoco.MjModel, property_key: tuple[str, str], new_value: np.ndarray) -> None:
+def set_property(mujoco_model: mujoco.MjModel, property_key: tuple[str, str], new_value: np.ndarray) -> None:
     """Write the value of a property into a model for ``described_model``. Raises KeyError if the model has no such
     property, ValueError if the property cannot have this value."""
     kind, number = _kind_and_index(mujoco_model, property_key)
@@ -122,7 +122,7 @@ def set_value(mujoco_model: mujoco.MjModel, property_key: tuple[str, str], new_v
     mujoco_model.body_sameframe[:] = 0
 
 
-def remove(mujoco_model: mujoco.MjModel, property_key: tuple[str, str]) -> bool:
+def remove_property(mujoco_model: mujoco.MjModel, property_key: tuple[str, str]) -> bool:
     """Set a property to zero in a model, if its kind allows this; returns whether it does."""
     kind, number = _kind_and_index(mujoco_model, property_key)
     if kind.kind not in REMOVABLE_KINDS:
@@ -131,12 +131,12 @@ def remove(mujoco_model: mujoco.MjModel, property_key: tuple[str, str]) -> bool:
     return True
 
 
-def _elements_of_kind(mujoco_model: mujoco.MjModel) -> Iterator[Element]:
+def _elements_of_kind(mujoco_model: mujoco.MjModel) -> Iterator[ModelProperty]:
     for kind in ELEMENT_KINDS:
         for number in range(_count_of_sort(mujoco_model, kind.sort)):
             value = np.atleast_1d(kind.read(mujoco_model, number))
             if value.size:
-                yield Element(
+                yield ModelProperty(
                     kind.kind, _owner_name(mujoco_model, kind, number), _unit_text(mujoco_model, kind, number), value
                 )
 
@@ -161,7 +161,9 @@ def _count_of_sort(mujoco_model: mujoco.MjModel, object_kind: str) -> int:
 
 
 def _owner_name(mujoco_model: mujoco.MjModel, property_kind: _PropertyKind, object_index: int) -> str:
-    return "the model" if property_kind.sort == "model" else label(mujoco_model, property_kind.sort, object_index)
+    return (
+        "the model" if property_kind.sort == "model" else object_label(mujoco_model, property_kind.sort, object_index)
+    )
 
 
 def _unit_text(mujoco_model: mujoco.MjModel, property_kind: _PropertyKind, object_index: int) -> str:
@@ -218,7 +220,7 @@ def _write_spring_reference(mujoco_model: mujoco.MjModel, joint: int, new_value:
         mujoco_model.qpos_spring[at] = mujoco_model.qpos0[at] + new_value[0]
 
 
-def _read_zero(mujoco_model: mujoco.MjModel, joint: int) -> np.ndarray:
+def _read_joint_zero(mujoco_model: mujoco.MjModel, joint: int) -> np.ndarray:
     """The joint coordinate that the file assigns to the design position of a hinge or slide."""
     at = int(mujoco_model.jnt_qposadr[joint])
     return (
@@ -228,7 +230,7 @@ def _read_zero(mujoco_model: mujoco.MjModel, joint: int) -> np.ndarray:
     )
 
 
-def _write_zero(mujoco_model: mujoco.MjModel, joint: int, new_value: np.ndarray) -> None:
+def _write_joint_zero(mujoco_model: mujoco.MjModel, joint: int, new_value: np.ndarray) -> None:
     at = int(mujoco_model.jnt_qposadr[joint])
     mujoco_model.qpos_spring[at] += new_value[0] - mujoco_model.qpos0[at]
     mujoco_model.qpos0[at] = new_value[0]
@@ -416,7 +418,7 @@ ELEMENT_KINDS = (
     _PropertyKind("body", "gravity compensation", "", *_body_accessors("body_gravcomp")),
     _PropertyKind("joint", "axis", "", _read_axis, _joint_accessors("jnt_axis")[1]),
     _PropertyKind("joint", "anchor", "m", *_joint_accessors("jnt_pos")),
-    _PropertyKind("joint", "zero", "rad | m", _read_zero, _write_zero),
+    _PropertyKind("joint", "zero", "rad | m", _read_joint_zero, _write_joint_zero),
     _PropertyKind("joint", "stiffness", "N m/rad | N/m", *_joint_accessors("jnt_stiffness")),
     _PropertyKind("joint", "spring reference", "rad | m", _read_spring_reference, _write_spring_reference),
     _PropertyKind("joint", "damping", "N m s/rad | N s/m", *_freedom_accessors("dof_damping")),

@@ -8,7 +8,14 @@ import numpy as np
 
 from models.engines.native_parts import Connection, Coupling
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT
-from models.own_model.names import feature_is_disabled, label, mass_body_name, moving_bodies, rotation_matrix, vector_of
+from models.own_model.names import (
+    feature_is_disabled,
+    mass_body_name,
+    moving_bodies,
+    object_label,
+    rotation_matrix,
+    vector_tuple,
+)
 
 CONNECT_EQUALITY, WELD_EQUALITY = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
 
@@ -31,7 +38,12 @@ def joint_couplings(mujoco_model: mujoco.MjModel) -> Iterator[Coupling]:
         offset, ratio = mujoco_model.eq_data[e, :2].tolist()
         softness = stiffness_and_damping(mujoco_model, mujoco_model.eq_solref[e], mujoco_model.eq_solimp[e])
         yield Coupling(
-            label(mujoco_model, "equality", e), int(mujoco_model.jnt_dofadr[first]), driver, ratio, offset, *softness
+            object_label(mujoco_model, "equality", e),
+            int(mujoco_model.jnt_dofadr[first]),
+            driver,
+            ratio,
+            offset,
+            *softness,
         )
 
 
@@ -77,8 +89,10 @@ def connections(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData) -> Ite
         turns = mujoco_model.eq_type[e] == WELD_EQUALITY and mujoco_model.eq_data[e, 10]
         axes = (turned, other) if turns else None
         softness = stiffness_and_damping(mujoco_model, mujoco_model.eq_solref[e], mujoco_model.eq_solimp[e])
-        ends = (first, vector_of(start)), (second, vector_of(end))
-        yield Connection(label(mujoco_model, "equality", e), ends, axes, *softness, float(mujoco_model.eq_data[e, 10]))
+        ends = (first, vector_tuple(start)), (second, vector_tuple(end))
+        yield Connection(
+            object_label(mujoco_model, "equality", e), ends, axes, *softness, float(mujoco_model.eq_data[e, 10])
+        )
 
 
 def _frames_of_ends(

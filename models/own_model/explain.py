@@ -14,23 +14,23 @@ import mujoco
 import numpy as np
 
 from models.core.errors import RunFailed
-from models.own_model.builds import PLAIN_BUILD, Motion, equations_of_build
+from models.own_model.builds import PLAIN_BUILD, StateMotion, equations_of_build
 from models.own_model.certificate import (
     EQUAL_ACCELERATION_SHARE,
     Agreement,
-    Reference,
+    MotionReference,
     agreement_of_build,
     comparison_states,
     motion_at,
     reference_of_file,
 )
 from models.own_model.elements import (
-    Element,
+    ModelProperty,
     distinct_texts,
     elements_of_model,
     is_word,
-    remove,
-    set_value,
+    remove_property,
+    set_property,
     tensor_of,
     two_digit_text,
 )
@@ -43,12 +43,12 @@ UNCOMPARED_KINDS = ("range", "softness")
 NO_EFFECT_SHARE = 1e-11
 """Relative change of accelerations and of the mass matrix below which a property has no influence: a tenth of what
 counts as different, and above the 7e-12 that rounding alone was seen to cause in a coordinate near 0."""
-Key = tuple[str, str]
+PropertyKey = tuple[str, str]
 States = list[tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True, eq=False)
-class Difference:
+class PropertyDifference:
     """A property that differs between two files: what it is, its values in both files (None: it has none), its unit,
     and its influence, the largest relative change of accelerations when it alone is as in the other file, or of the
     mass matrix where no acceleration changes (None where it cannot be tried); off : it is listed, and not compared;
@@ -64,7 +64,7 @@ class Difference:
     said: str = ""
 
     @property
-    def key(self) -> Key:
+    def key(self) -> PropertyKey:
         """Identification of the property that differs: its kind and owner."""
         return self.kind, self.owner
 
@@ -76,13 +76,13 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ModelComparison:
     """Comparison of two files: agreement of their accelerations; properties that differ, the most influential first;
     the disagreement that remains when the second file's values are taken for all of these; and coordinates that only
     one file has."""
 
     acceleration_agreement: Agreement | None
-    differences: tuple[Difference, ...]
+    differences: tuple[PropertyDifference, ...]
     unexplained_difference: float
     unmatched_coordinates: tuple[str, ...]
 
@@ -92,19 +92,19 @@ class Comparison:
         return self.acceleration_agreement is not None and self.acceleration_agreement.alike
 
     @property
-    def influential(self) -> tuple[Difference, ...]:
+    def influential(self) -> tuple[PropertyDifference, ...]:
         """Differences that change accelerations or the mass matrix, and those whose influence could not be
         determined."""
         tried = (each for each in self.differences if not each.off)
         return tuple(each for each in tried if each.influence is None or each.influence > NO_EFFECT_SHARE)
 
     @property
-    def not_compared(self) -> tuple[Difference, ...]:
+    def not_compared(self) -> tuple[PropertyDifference, ...]:
         """Differences in properties that are off, or that only MuJoCo has: they are listed and not compared."""
         return tuple(each for each in self.differences if each.off)
 
     @property
-    def silent_differences(self) -> tuple[Difference, ...]:
+    def silent_differences(self) -> tuple[PropertyDifference, ...]:
         """Differences that change neither accelerations nor the mass matrix."""
         return tuple(each for each in self.differences if each not in (*self.influential, *self.not_compared))
 
@@ -120,11 +120,11 @@ class Comparison:
         )
 
 
-def compare(first_model: TwinModel, second_model: TwinModel, state_count: int = STATE_COUNT) -> Comparison:
+def compare_models(first_model: TwinModel, second_model: TwinModel, state_count: int = STATE_COUNT) -> ModelComparison:
     """Comparison of two model files, at random states within the ranges of the first file."""
     unmatched = _unmatched_coordinates(first_model, second_model)
     if unmatched:
-        return Comparison(None, tuple(_differences(first_model, second_model, None)), np.inf, tuple(unmatched))
+        return ModelComparison(None, tuple(_differences(first_model, second_model, None)), np.inf, tuple(unmatched))
     order = [second_model.names.index(name) for name in first_model.names]
     states = comparison_states(first_model, state_count)
     places = _reordered_states(states, order)
@@ -149,10 +149,10 @@ def compare(first_model: TwinModel, second_model: TwinModel, state_count: int = 
     left = agreement_of_build(
         "", replace(_with_larger_sensitivity(here, there, order), motions=changed), _reordered_motion(remaining, order)
     )
-    return Comparison(apart, tuple(differences), left.acceleration, ())
+    return ModelComparison(apart, tuple(differences), left.acceleration, ())
 
 
-def _importance_key(difference: Difference) -> float:
+def _importance_key(difference: PropertyDifference) -> float:
     """Sort key: differences with unknown influence first, then the most influential."""
     return -np.inf if difference.influence is None else -difference.influence
 
@@ -163,7 +163,7 @@ class _PropertyTrial:
 
     twin: TwinModel
     states: States
-    base: Reference
+    base: MotionReference
 
     def influence(self, mujoco_model: mujoco.MjModel) -> float | None:
         """Largest relative change that a changed model causes in accelerations, or in the mass matrix if these do not
@@ -175,32 +175,32 @@ class _PropertyTrial:
             return None
 
     def with_all(
-        self, other_elements: dict[Key, Element], differences: Sequence[Difference]
-    ) -> tuple[mujoco.MjModel, list[Key]]:
+        self, other_elements: dict[PropertyKey, ModelProperty], differences: Sequence[PropertyDifference]
+    ) -> tuple[mujoco.MjModel, list[PropertyKey]]:
         """The model with all differing properties changed to the other file's values where possible, and the properties
         that were changed."""
-        model, taken = copy(self.twin.model), list[Key]()
+        model, taken = copy(self.twin.model), list[PropertyKey]()
         for each in sorted(differences, key=lambda each: each.kind == "spring reference"):
             value = other_elements[each.key].value if each.key in other_elements else np.zeros_like(each.first)
             with suppress(ValueError, KeyError):
-                set_value(model, each.key, value)
+                set_property(model, each.key, value)
                 taken.append(each.key)
         return model, taken
 
-    def with_one(self, property_key: Key, new_value: np.ndarray) -> mujoco.MjModel:
+    def with_one(self, property_key: PropertyKey, new_value: np.ndarray) -> mujoco.MjModel:
         """The model with one property set to another value."""
         model = copy(self.twin.model)
-        set_value(model, property_key, new_value)
+        set_property(model, property_key, new_value)
         return model
 
-    def without(self, property_keys: Sequence[Key]) -> mujoco.MjModel:
+    def without(self, property_keys: Sequence[PropertyKey]) -> mujoco.MjModel:
         """The model with the given properties removed, where they can be."""
         model = copy(self.twin.model)
         for key in property_keys:
-            remove(model, key)
+            remove_property(model, key)
         return model
 
-    def motions(self, mujoco_model: mujoco.MjModel) -> list[Motion]:
+    def motions(self, mujoco_model: mujoco.MjModel) -> list[StateMotion]:
         """Motion of a changed model at the states of the trial."""
         return motion_at(equations_of_build(described_model(mujoco_model, self.twin.name), PLAIN_BUILD), self.states)
 
@@ -211,10 +211,10 @@ def _reordered_states(states: States, coordinate_order: list[int]) -> States:
     return [(q[places], v[places]) for q, v in states]
 
 
-def _reordered_motion(second_motions: Sequence[Motion], coordinate_order: list[int]) -> list[Motion]:
+def _reordered_motion(second_motions: Sequence[StateMotion], coordinate_order: list[int]) -> list[StateMotion]:
     """Motion of the second file, reordered to the coordinates of the first."""
     return [
-        Motion(
+        StateMotion(
             each.mass[np.ix_(coordinate_order, coordinate_order)],
             each.force[coordinate_order],
             each.acceleration[coordinate_order],
@@ -224,13 +224,15 @@ def _reordered_motion(second_motions: Sequence[Motion], coordinate_order: list[i
 
 
 def _with_larger_sensitivity(
-    first_reference: Reference, second_reference: Reference, coordinate_order: list[int]
-) -> Reference:
+    first_reference: MotionReference, second_reference: MotionReference, coordinate_order: list[int]
+) -> MotionReference:
     """The first file's reference, with the larger rounding sensitivity of the two files."""
     pairs = zip(
         first_reference.sensitivities, _reordered_motion(second_reference.sensitivities, coordinate_order), strict=True
     )
-    return replace(first_reference, sensitivities=[Motion(*map(np.maximum, first, second)) for first, second in pairs])
+    return replace(
+        first_reference, sensitivities=[StateMotion(*map(np.maximum, first, second)) for first, second in pairs]
+    )
 
 
 def _unmatched_coordinates(first_model: TwinModel, second_model: TwinModel) -> list[str]:
@@ -244,11 +246,11 @@ def _unmatched_coordinates(first_model: TwinModel, second_model: TwinModel) -> l
 
 def _differences(
     first_model: TwinModel, second_model: TwinModel, property_trials: tuple[_PropertyTrial, _PropertyTrial] | None
-) -> list[Difference]:
+) -> list[PropertyDifference]:
     """Properties that differ between the files; property_trials : one for the first and one for the second file, None
     if they have no common states."""
     rows, listed, others = (
-        list[Difference](),
+        list[PropertyDifference](),
         elements_of_model(first_model.model),
         elements_of_model(second_model.model),
     )
@@ -266,15 +268,15 @@ def _differences(
         first_value, second_value = (None if each is None else each.value for each in (element, other))
         kind = "orientation of the inertia" if _differ_in_orientation_alone(key[0], element, other) else key[0]
         off = key[0] in UNCOMPARED_KINDS or (key[0] == "friction loss" and not rubbing)
-        rows.append(Difference(*key, there.unit, first_value, second_value, influence, off, kind))
+        rows.append(PropertyDifference(*key, there.unit, first_value, second_value, influence, off, kind))
     return rows
 
 
 def _influence_of_difference(
     property_trials: tuple[_PropertyTrial, _PropertyTrial],
-    property_key: Key,
-    first_element: Element | None,
-    second_element: Element | None,
+    property_key: PropertyKey,
+    first_element: ModelProperty | None,
+    second_element: ModelProperty | None,
 ) -> float | None:
     """Influence of one difference: the first file takes over the other's value, or the second file loses a property
     that only it has. None if the first file cannot have that value."""
@@ -289,7 +291,7 @@ def _influence_of_difference(
 
 
 def _differ_in_orientation_alone(
-    property_kind: str, first_element: Element | None, second_element: Element | None
+    property_kind: str, first_element: ModelProperty | None, second_element: ModelProperty | None
 ) -> bool:
     """Whether two inertias have the same principal moments and differ only in orientation."""
     if property_kind != "inertia" or first_element is None or second_element is None:
@@ -298,7 +300,9 @@ def _differ_in_orientation_alone(
     return bool(np.abs(first - second).max() <= 1e-9 * first.max())
 
 
-def _is_insignificant(present_element: Element, first_element: Element | None, second_element: Element | None) -> bool:
+def _is_insignificant(
+    present_element: ModelProperty, first_element: ModelProperty | None, second_element: ModelProperty | None
+) -> bool:
     """Whether a property that only one file has is insignificant: zero, or a word that repeats other properties."""
     return (first_element is None or second_element is None) and (
         is_word(present_element.value) or not present_element.is_nonzero
@@ -307,16 +311,16 @@ def _is_insignificant(present_element: Element, first_element: Element | None, s
 
 def removals_that_agree(
     user_model: TwinModel, build_name: str, state_count: int = STATE_COUNT
-) -> list[tuple[Element, float]]:
+) -> list[tuple[ModelProperty, float]]:
     """Properties whose removal makes a build agree with the file's model in MuJoCo; each is removed from both.
 
     With each its relative difference of accelerations without it, the smallest first; empty where none explains it.
     """
     states = comparison_states(user_model, state_count)
-    rows = list[tuple[Element, float]]()
+    rows = list[tuple[ModelProperty, float]]()
     for key, element in elements_of_model(user_model.model).items():
         model = copy(user_model.model)
-        if not element.is_nonzero or not remove(model, key):
+        if not element.is_nonzero or not remove_property(model, key):
             continue
         less = described_model(model, user_model.name)
         seen = agreement_of_build(

@@ -10,10 +10,10 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.engines.mujoco_quiet import without_warnings
-from models.own_model.content import Content, check_and_leave_out, limits_switched_off
-from models.own_model.names import label
+from models.own_model.content import FileContent, check_and_leave_out, limits_switched_off
+from models.own_model.names import object_label
 from models.own_model.reading import TwinModel, described_model
-from models.own_model.xml_guard import Document, checked_document
+from models.own_model.xml_guard import ModelXml, checked_document
 
 NUMBERS_OF_MOTION = (
     *("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_gravcomp"),
@@ -53,14 +53,16 @@ class ModelFile:
     sentences on what reading passed over.
     """
 
-    document: Document
+    document: ModelXml
     twin: TwinModel
-    removed_contents: tuple[Content, ...]
+    removed_contents: tuple[FileContent, ...]
     ignored_limits: tuple[str, ...]
     notes: tuple[str, ...]
 
 
-def read(model_path: Path, left_out_kinds: Collection[str] = (), allowed_folder: Path | None = None) -> ModelFile:
+def read_model_file(
+    model_path: Path, left_out_kinds: Collection[str] = (), allowed_folder: Path | None = None
+) -> ModelFile:
     """Read the model file at a path. Raises InputError for what cannot be read, or has no equivalent and is not named
     in ``left_out_kinds``.
 
@@ -68,13 +70,13 @@ def read(model_path: Path, left_out_kinds: Collection[str] = (), allowed_folder:
     """
     document = checked_document(model_path, allowed_folder)
     model, notes = compiled_model(document)
-    check_sane(model, model_path.name, document.kind)
+    check_model_numbers(model, model_path.name, document.kind)
     left_out = check_and_leave_out(model, document, left_out_kinds)
     twin = described_model(model, model_path.stem)
     return ModelFile(document, twin, tuple(left_out), tuple(limits_switched_off(model)), tuple(notes))
 
 
-def compiled_model(model_xml: Document) -> tuple[mujoco.MjModel, list[str]]:
+def compiled_model(model_xml: ModelXml) -> tuple[mujoco.MjModel, list[str]]:
     """The document compiled by MuJoCo's parser, and notes. Raises InputError with the parser's message, the line of
     what it names, and what may help."""
     path, urdf = model_xml.path, model_xml.urdf
@@ -93,7 +95,7 @@ def compiled_model(model_xml: Document) -> tuple[mujoco.MjModel, list[str]]:
         raise InputError(path.name, "", None, told) from None
 
 
-def _place_text(model_xml: Document, parser_message: str) -> str:
+def _place_text(model_xml: ModelXml, parser_message: str) -> str:
     """Text " (FILE:LINE)" of the element that a message of MuJoCo's parser names without its line, or with line 0 for
     an include; "" if unknown."""
     if named := re.search(r"Element name '([^']+)', id \d+(?!.*line)", parser_message):
@@ -107,13 +109,13 @@ def _place_text(model_xml: Document, parser_message: str) -> str:
     return f" ({place})" if place else ""
 
 
-def _remedy_text(model_xml: Document, parser_message: str) -> str:
+def _remedy_text(model_xml: ModelXml, parser_message: str) -> str:
     """Text on how to correct a mistake that a message of MuJoCo's parser reports; "" where that is plain."""
     said = next((remedy for part, remedy in REMEDIES.items() if part in parser_message), "")
     return f". {said.format(place=COMPILER_PLACES[model_xml.kind])}" if said else ""
 
 
-def check_sane(mujoco_model: mujoco.MjModel, file_name: str, file_kind: str = "MJCF") -> None:
+def check_model_numbers(mujoco_model: mujoco.MjModel, file_name: str, file_kind: str = "MJCF") -> None:
     """Raise InputError if nothing can move, if a number that affects motion is not finite, if the time step is not
     above 0, or if dry friction is negative."""
     if not mujoco_model.nv:
@@ -149,7 +151,9 @@ def _owner_name(mujoco_model: mujoco.MjModel, array_name: str, row_index: int) -
     """Name of the part of the model to which a row of the numbers belongs; "" where it belongs to none."""
     prefix = array_name.partition("_")[0]
     if prefix == "dof":
-        return label(mujoco_model, "joint", int(mujoco_model.dof_jntid[row_index]))
+        return object_label(mujoco_model, "joint", int(mujoco_model.dof_jntid[row_index]))
     if prefix.startswith("qpos"):
-        return label(mujoco_model, "joint", int(np.searchsorted(mujoco_model.jnt_qposadr, row_index, side="right")) - 1)
-    return label(mujoco_model, OWNERS[prefix], row_index) if prefix in OWNERS else ""
+        return object_label(
+            mujoco_model, "joint", int(np.searchsorted(mujoco_model.jnt_qposadr, row_index, side="right")) - 1
+        )
+    return object_label(mujoco_model, OWNERS[prefix], row_index) if prefix in OWNERS else ""

@@ -11,7 +11,7 @@ from copy import copy
 import mujoco
 import numpy as np
 
-from models.own_model.names import label
+from models.own_model.names import object_label
 from models.own_model.reading import TwinModel
 
 LIMIT_CONSTRAINTS = {
@@ -33,7 +33,7 @@ def limits_struck(user_model: TwinModel) -> Callable[[np.ndarray], tuple[str, ..
         mujoco.mj_fwdPosition(model, data)
         rows = zip(data.efc_type.tolist(), data.efc_id.tolist(), strict=True)
         return tuple(
-            label(model, LIMIT_CONSTRAINTS[kind], number) for kind, number in rows if kind in LIMIT_CONSTRAINTS
+            object_label(model, LIMIT_CONSTRAINTS[kind], number) for kind, number in rows if kind in LIMIT_CONSTRAINTS
         )
 
     return struck

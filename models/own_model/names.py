@@ -23,13 +23,13 @@ def first_names_text(object_names: Sequence[str]) -> str:
     return ", ".join(object_names[:NAMES_SHOWN]) + more
 
 
-def label(mujoco_model: mujoco.MjModel, object_kind: str, object_index: int) -> str:
+def object_label(mujoco_model: mujoco.MjModel, object_kind: str, object_index: int) -> str:
     """Text that names a joint, body, tendon, actuator or the like of a file; its number if it has no name."""
-    name = name_of(mujoco_model, object_kind, object_index)
+    name = object_name(mujoco_model, object_kind, object_index)
     return f"{object_kind} {name!r}" if name else f"{object_kind} {object_index}"
 
 
-def name_of(mujoco_model: mujoco.MjModel, object_kind: str, object_index: int) -> str:
+def object_name(mujoco_model: mujoco.MjModel, object_kind: str, object_index: int) -> str:
     """Name of an object in the file; "" if there is none."""
     return (
         mujoco.mj_id2name(mujoco_model, int(getattr(mujoco.mjtObj, f"mjOBJ_{object_kind.upper()}")), object_index) or ""
@@ -41,7 +41,9 @@ def coordinate_names(mujoco_model: mujoco.MjModel) -> tuple[str, ...]:
     names = list[str]()
     for j in range(mujoco_model.njnt):
         of = FREEDOMS_OF_JOINT.get(int(mujoco_model.jnt_type[j]), ())
-        names += [f"{label(mujoco_model, 'joint', j)} {freedom}" for freedom in of] or [label(mujoco_model, "joint", j)]
+        names += [f"{object_label(mujoco_model, 'joint', j)} {freedom}" for freedom in of] or [
+            object_label(mujoco_model, "joint", j)
+        ]
     return tuple(names)
 
 
@@ -86,7 +88,7 @@ def mass_body_name(body: int) -> str:
     return f"body {body}"
 
 
-def vector_of(components: np.ndarray) -> Vector:
+def vector_tuple(components: np.ndarray) -> Vector:
     """Three numbers as a tuple, the form of vectors in descriptions."""
     x, y, z = np.asarray(components, float).tolist()
     return x, y, z
@@ -94,7 +96,7 @@ def vector_of(components: np.ndarray) -> Vector:
 
 def matrix_rows(matrix: np.ndarray) -> tuple[Vector, Vector, Vector]:
     """Matrix (3, 3) as a tuple of rows, the form of matrices in descriptions."""
-    x, y, z = map(vector_of, matrix)
+    x, y, z = map(vector_tuple, matrix)
     return x, y, z
 
 

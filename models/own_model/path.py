@@ -15,7 +15,7 @@ import numpy as np
 from scipy.integrate import simpson
 
 from models.core.errors import InputError, RunFailed
-from models.engines.free_vehicle import ENGINES, FreeModel, Plain, free_model
+from models.engines.free_vehicle import ENGINES, FreeModel, PlainModel, free_model
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_march import march
 from models.multibody.plain.joint_elements import PlainTree
@@ -285,10 +285,10 @@ def path_of_build(
 def _model_of_build(user_model: TwinModel, build_name: str) -> FreeModel:
     if user_model.driven.tied and build_name != SOFT_BUILD:
         move = equations_of_build(user_model, build_name)
-        return Plain(build_name, lambda time, q, v: move(q, v).acceleration, user_model.size)
+        return PlainModel(build_name, lambda time, q, v: move(q, v).acceleration, user_model.size)
     if build_name != PLAIN_BUILD:
         return free_model(build_name, user_model.driven)
-    return Plain(PLAIN_BUILD, plain_tree(user_model).acceleration, user_model.size)
+    return PlainModel(PLAIN_BUILD, plain_tree(user_model).acceleration, user_model.size)
 
 
 def file_path(

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from models.engines.free_vehicle import Driven
+from models.engines.free_vehicle import LoadedVehicle
 from models.engines.native_parts import BodyLoad, DryFriction, GroundSpring, LineSpring, TurningSpring, joint_parts
-from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, Coordinates
+from models.own_model.coordinates import BALL_JOINT, FREE_JOINT, ModelCoordinates
 from models.own_model.equalities import connections, joint_couplings, stiffness_and_damping
 from models.own_model.names import (
     FREEDOMS_OF_JOINT,
@@ -21,12 +21,12 @@ from models.own_model.names import (
     feature_is_disabled,
     joint_body_name,
     joints_above,
-    label,
     mass_body_name,
     matrix_rows,
     moving_bodies,
+    object_label,
     rotation_matrix,
-    vector_of,
+    vector_tuple,
 )
 from models.vehicles.spatial import PARALLEL, Body, Freedom, JointElement, SpatialVehicle, Vector
 
@@ -42,8 +42,8 @@ class TwinModel:
 
     name: str
     model: mujoco.MjModel
-    driven: Driven
-    coordinates: Coordinates
+    driven: LoadedVehicle
+    coordinates: ModelCoordinates
 
     @property
     def size(self) -> int:
@@ -75,8 +75,8 @@ def described_model(mujoco_model: mujoco.MjModel, file_name: str) -> TwinModel:
     parts = joint_parts(vehicle)
     turns = tuple(turning_springs(mujoco_model, design))
     pushes = tuple(body_loads(mujoco_model, design))
-    driven = Driven(vehicle, gravity, np.zeros(1), None, None, parts, loads, lines, *ties, turns, pushes)
-    return TwinModel(file_name, mujoco_model, driven, Coordinates(mujoco_model, design))
+    driven = LoadedVehicle(vehicle, gravity, np.zeros(1), None, None, parts, loads, lines, *ties, turns, pushes)
+    return TwinModel(file_name, mujoco_model, driven, ModelCoordinates(mujoco_model, design))
 
 
 def joint_elements(mujoco_model: mujoco.MjModel) -> tuple[JointElement, ...]:
@@ -96,7 +96,7 @@ def _bodies(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData) -> Iterato
         axes = design_data.ximat[b].reshape(3, 3)
         inertia = matrix_rows(axes * mujoco_model.body_inertia[b] @ axes.T + _armature_inertia(mujoco_model, b))
         yield Body(
-            mass_body_name(b), float(mujoco_model.body_mass[b]), vector_of(design_data.xipos[b]), (), inertia, behind
+            mass_body_name(b), float(mujoco_model.body_mass[b]), vector_tuple(design_data.xipos[b]), (), inertia, behind
         )
 
 
@@ -105,12 +105,12 @@ def _joint_body(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, joint:
     kind, body = int(mujoco_model.jnt_type[joint]), int(mujoco_model.jnt_bodyid[joint])
     if kind in FREEDOMS_OF_JOINT:
         anchor = design_data.xpos[body] if kind == FREE_JOINT else design_data.xanchor[joint]
-        return Body(joint_body_name(joint), 0.0, vector_of(anchor), FREEDOMS_OF_JOINT[kind], parent=parent_name)
+        return Body(joint_body_name(joint), 0.0, vector_tuple(anchor), FREEDOMS_OF_JOINT[kind], parent=parent_name)
     freedoms: tuple[Freedom, ...] = (coordinate_of(mujoco_model, joint)[1],)
     return Body(
         joint_body_name(joint),
         0.0,
-        vector_of(design_data.xanchor[joint]),
+        vector_tuple(design_data.xanchor[joint]),
         freedoms,
         parent=parent_name,
         axes=_axes_along(design_data.xaxis[joint]),
@@ -152,7 +152,7 @@ def _joint_elements(mujoco_model: mujoco.MjModel) -> Iterator[JointElement]:
             held = stiffness * float(mujoco_model.qpos0[place + i] - mujoco_model.qpos_spring[place + i])
             if stiffness or damping or inertia:
                 numbers = (stiffness, damping, held, inertia)
-                name = f"{label(mujoco_model, 'joint', j)} {freedom if free else ''}".rstrip()
+                name = f"{object_label(mujoco_model, 'joint', j)} {freedom if free else ''}".rstrip()
                 yield JointElement(name, ((joint_body_name(j), freedom),), (1.0,), *numbers)
 
 
@@ -196,9 +196,11 @@ def line_springs(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData) -> It
         bodies = [int(mujoco_model.site_bodyid[s]) for s in sites_of(mujoco_model, t)]
         if (stiffness or damping) and bodies[0] != bodies[1]:
             first, second = (mass_body_name(b) if b in numbers else None for b in bodies)
-            start, end = (vector_of(design_data.site_xpos[s]) for s in sites_of(mujoco_model, t))
+            start, end = (vector_tuple(design_data.site_xpos[s]) for s in sites_of(mujoco_model, t))
             length = float(mujoco_model.tendon_lengthspring[t, 0])
-            yield LineSpring(label(mujoco_model, "tendon", t), first, second, start, end, stiffness, damping, length)
+            yield LineSpring(
+                object_label(mujoco_model, "tendon", t), first, second, start, end, stiffness, damping, length
+            )
 
 
 def turning_springs(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData) -> Iterator[TurningSpring]:
@@ -213,7 +215,7 @@ def turning_springs(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData) ->
         place, axes = int(mujoco_model.jnt_qposadr[j]) + 3 * free, design_data.xmat[body].reshape(3, 3).copy()
         rest = rotation_matrix(mujoco_model.qpos_spring[place : place + 4])
         yield TurningSpring(
-            label(mujoco_model, "joint", j),
+            object_label(mujoco_model, "joint", j),
             _bodies_beside(mujoco_model, j),
             (rest if free else axes @ rest, axes),
             stiffness,
@@ -250,7 +252,7 @@ def dry_frictions(mujoco_model: mujoco.MjModel) -> Iterator[DryFriction]:
         first = int(mujoco_model.jnt_dofadr[j])
         softness = stiffness_and_damping(mujoco_model, mujoco_model.dof_solref[first], mujoco_model.dof_solimp[first])
         yield DryFriction(
-            label(mujoco_model, "joint", j), first, float(mujoco_model.dof_frictionloss[first]), *softness
+            object_label(mujoco_model, "joint", j), first, float(mujoco_model.dof_frictionloss[first]), *softness
         )
 
 
@@ -278,7 +280,9 @@ def _tendon_elements(mujoco_model: mujoco.MjModel) -> Iterator[JointElement]:
             float(mujoco_model.tendon_armature[t]),
         )
         if stiffness or damping or inertia:
-            yield JointElement(label(mujoco_model, "tendon", t), places, factors, stiffness, damping, held, inertia)
+            yield JointElement(
+                object_label(mujoco_model, "tendon", t), places, factors, stiffness, damping, held, inertia
+            )
 
 
 def constant_controls(mujoco_model: mujoco.MjModel) -> np.ndarray:
@@ -328,9 +332,9 @@ def body_loads(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData) -> Iter
         wrench = force * mujoco_model.actuator_gear[i].reshape(2, 3) @ axes.T
         if wrench.any() and body in numbers:
             yield BodyLoad(
-                label(mujoco_model, "actuator", i),
+                object_label(mujoco_model, "actuator", i),
                 mass_body_name(body),
-                vector_of(design_data.site_xpos[site]),
+                vector_tuple(design_data.site_xpos[site]),
                 *wrench,
             )
 
@@ -348,7 +352,9 @@ def _actuator_elements(mujoco_model: mujoco.MjModel) -> Iterator[JointElement]:
         offset, slope, rate = affine_law(mujoco_model, i, float(constant[i]))
         if offset or slope or rate:
             numbers = (-slope, -rate, -(offset + slope * gear * start))
-            yield JointElement(label(mujoco_model, "actuator", i), places, tuple(gear * k for k in factors), *numbers)
+            yield JointElement(
+                object_label(mujoco_model, "actuator", i), places, tuple(gear * k for k in factors), *numbers
+            )
 
 
 def compensation(mujoco_model: mujoco.MjModel, body: int) -> float:
@@ -373,5 +379,5 @@ def _compensated_loads(
     for b in moving_bodies(mujoco_model):
         if mujoco_model.body_mass[b] and gravity.any() and compensation(mujoco_model, b) == 1.0:
             load, still = -gravity * float(mujoco_model.body_gravcomp[b] * mujoco_model.body_mass[b]), np.zeros(3)
-            point = vector_of(design_data.xipos[b])
+            point = vector_tuple(design_data.xipos[b])
             yield GroundSpring(mass_body_name(b), point, point, still, still, load)  # type: ignore[arg-type]

@@ -24,7 +24,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from models.own_model.builds import Equations, Motion, State, equations_of_file, forward_state
+from models.own_model.builds import Equations, State, StateMotion, equations_of_file, forward_state
 from models.own_model.coordinates import BALL_JOINT, FREE_JOINT
 from models.own_model.equalities import joins_bodies
 from models.own_model.names import moving_bodies
@@ -50,15 +50,15 @@ EquationsOfModel = Callable[[TwinModel], Equations]
 
 
 def sensitivities(
-    user_model: TwinModel, equations_of: EquationsOfModel, states: Sequence[State], motions: Sequence[Motion]
-) -> list[Motion]:
+    user_model: TwinModel, equations_of: EquationsOfModel, states: Sequence[State], motions: Sequence[StateMotion]
+) -> list[StateMotion]:
     """Rounding sensitivities of mass (n, n), force (n,) and acceleration (n,) at each state: rms change per relative
     random change of all input numbers.
 
     equations_of, motions : the equations of MuJoCo's model of the file, and its motion at the states.
     """
     draw, reach = np.random.default_rng(SEED), reach_of(user_model)
-    squares = [Motion(*map(np.zeros_like, each)) for each in motions]
+    squares = [StateMotion(*map(np.zeros_like, each)) for each in motions]
     for _ in range(RANDOM_CHANGES):
         move = equations_of(replace(user_model, model=changed_model(user_model.model, draw, reach)))
         for square, exact, (q, v) in zip(squares, motions, states, strict=True):
@@ -66,7 +66,7 @@ def sensitivities(
             for total, there, here in zip(square, other, exact, strict=True):
                 total += ((there - here) / CHANGED_SHARE) ** 2 / RANDOM_CHANGES
     by_numbers = [
-        _with_solver_rounding(_with_summation_rounding(Motion(*map(np.sqrt, square)), exact, sums), exact)
+        _with_solver_rounding(_with_summation_rounding(StateMotion(*map(np.sqrt, square)), exact, sums), exact)
         for square, exact, sums in zip(squares, motions, _sums_of_rates(user_model, states), strict=True)
     ]
     return (
@@ -76,7 +76,7 @@ def sensitivities(
     )
 
 
-def _with_summation_rounding(sensitivity: Motion, motion: Motion, force_sums: np.ndarray) -> Motion:
+def _with_summation_rounding(sensitivity: StateMotion, motion: StateMotion, force_sums: np.ndarray) -> StateMotion:
     """Rounding sensitivities, with the rounding of summing forces of the sizes (n,) ``force_sums`` added; these
     forces may cancel."""
     by_sums = np.abs(np.linalg.pinv(motion.mass)) @ force_sums
@@ -102,7 +102,7 @@ def _sums_of_rates(user_model: TwinModel, states: Sequence[State]) -> Iterator[n
         yield np.abs(state.jacobian).T @ sums
 
 
-def _with_solver_rounding(sensitivity: Motion, motion: Motion) -> Motion:
+def _with_solver_rounding(sensitivity: StateMotion, motion: StateMotion) -> StateMotion:
     """Rounding sensitivities, with that of solving M a = f for the accelerations a added, where every entry of the mass
     matrix M is rounded.
 
@@ -115,7 +115,7 @@ def _with_solver_rounding(sensitivity: Motion, motion: Motion) -> Motion:
     return sensitivity._replace(acceleration=sensitivity.acceleration + solution)
 
 
-def _unconstrained_motion(user_model: TwinModel, states: Sequence[State]) -> list[Motion]:
+def _unconstrained_motion(user_model: TwinModel, states: Sequence[State]) -> list[StateMotion]:
     """Motion of the file's model in MuJoCo at the states, without its equality constraints."""
     model = copy(user_model.model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EQUALITY)
@@ -123,7 +123,7 @@ def _unconstrained_motion(user_model: TwinModel, states: Sequence[State]) -> lis
     return [move(q, v) for q, v in states]
 
 
-def _with_constraint_rounding(sensitivity: Motion, unconstrained_motion: Motion) -> Motion:
+def _with_constraint_rounding(sensitivity: StateMotion, unconstrained_motion: StateMotion) -> StateMotion:
     """Rounding sensitivities, with the motion that constraints suppress added. Rounding errors of all other coordinates
     remain in a stopped coordinate, weighted with the root of inertia."""
     weight = np.sqrt(unconstrained_motion.mass.diagonal())

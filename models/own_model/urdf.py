@@ -14,9 +14,9 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.own_model.file import ModelFile
-from models.own_model.names import label
+from models.own_model.names import object_label
 from models.own_model.urdf_text import parsed_root
-from models.vehicles.spatial import steiner
+from models.vehicles.spatial import point_mass_inertia
 
 PARSER_TOLERANCE = 1e-6
 """Relative difference allowed between file and parser: the parser keeps all digits, yet computing principal axes costs
@@ -65,7 +65,7 @@ class _LinkMass:
             return
         total = self.mass + mass
         middle = (self.mass * self.centre + mass * centre) / total if total else centre
-        moved = steiner(self.mass, self.centre - middle) + steiner(mass, centre - middle)
+        moved = point_mass_inertia(self.mass, self.centre - middle) + point_mass_inertia(mass, centre - middle)
         self.mass, self.centre, self.inertia = total, middle, self.inertia + inertia + moved
 
 
@@ -91,7 +91,7 @@ def _compared_mass(
     stands = body <= 0 or mujoco_model.body_weldid[body] == 0
     if stands or expected_mass.centre is None or expected_mass.inertia is None:
         return []
-    axes, owner = design_data.ximat[body].reshape(3, 3), label(mujoco_model, "body", body)
+    axes, owner = design_data.ximat[body].reshape(3, 3), object_label(mujoco_model, "body", body)
     tensor = axes * mujoco_model.body_inertia[body] @ axes.T
     pairs = (
         ("mass", "kg", np.array([expected_mass.mass]), np.array([mujoco_model.body_mass[body]])),
@@ -113,7 +113,7 @@ def _compared_joint(
     joint = mujoco.mj_name2id(mujoco_model, mujoco.mjtObj.mjOBJ_JOINT, joint_name)
     if joint < 0:
         return []
-    owner = label(mujoco_model, "joint", joint)
+    owner = object_label(mujoco_model, "joint", joint)
     pairs = (
         ("axis", "", expected_axis, design_data.xaxis[joint]),
         ("anchor", "m", expected_anchor, design_data.xanchor[joint]),

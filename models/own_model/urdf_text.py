@@ -29,7 +29,7 @@ class UrdfText:
 
 
 @dataclass
-class _Writer:
+class _UrdfWriter:
     """Writer of the wanted elements of a URDF, each on its original line.
 
     fixed_links, links_with_mass : names of links that stand on the world, and that have masses; removed_tags : counts
@@ -87,7 +87,7 @@ def text_for_mujoco(file_content: bytes) -> UrdfText:
     links = root.findall("link")
     massive = frozenset(link.get("name", "") for link in links if link.find("inertial") is not None)
     standing = fixed_links(root)
-    writer = _Writer(frozenset(standing), massive)
+    writer = _UrdfWriter(frozenset(standing), massive)
     text = writer.write(file_content)
     return UrdfText(text, tuple(_notes(root, standing, massive, writer.removed_tags)))
 

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from models.core.errors import InputError
-from models.own_model.xml_guard import Document
+from models.own_model.xml_guard import ModelXml
 
 WHEEL_SITE_PATTERN = re.compile(r"(?:tyre|hub)[ _.:-]*(.*)", re.IGNORECASE)
 EXAMPLE_SITE = '<site name="tyre front_left" pos="X Y Z" user="STIFFNESS DAMPING CORNERING"/>'
@@ -40,7 +40,7 @@ class WheelSite:
     cornering: float
 
 
-def wheel_sites(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, model_xml: Document) -> tuple[WheelSite, ...]:
+def wheel_sites(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, model_xml: ModelXml) -> tuple[WheelSite, ...]:
     """Wheel sites from front to rear, left before right. Raises InputError if the sites do not form the axles of a car.
 
     design_data : data of the model in the design position, with kinematics computed.
@@ -72,21 +72,21 @@ def wheel_sites(mujoco_model: mujoco.MjModel, design_data: mujoco.MjData, model_
     )
 
 
-def site_text(mujoco_model: mujoco.MjModel, model_xml: Document, site: int) -> str:
+def site_text(mujoco_model: mujoco.MjModel, model_xml: ModelXml, site: int) -> str:
     """Text by which messages name a site."""
     name = mujoco_model.site(site).name
     line = model_xml.line(("site",), name)
     return f"site {name!r}" + (f" ({line})" if line else "")
 
 
-def _refuse(mujoco_model: mujoco.MjModel, model_xml: Document, site: int, wrong_value: object, reason: str) -> NoReturn:
+def _refuse(mujoco_model: mujoco.MjModel, model_xml: ModelXml, site: int, wrong_value: object, reason: str) -> NoReturn:
     raise InputError(model_xml.path.name, site_text(mujoco_model, model_xml, site), wrong_value, reason)
 
 
 def _check_site(
     mujoco_model: mujoco.MjModel,
     design_data: mujoco.MjData,
-    model_xml: Document,
+    model_xml: ModelXml,
     site: int,
     site_name: str,
     is_repeated: bool,
@@ -111,7 +111,7 @@ def _check_site(
 
 
 def _axles(
-    design_data: mujoco.MjData, model_xml: Document, mujoco_model: mujoco.MjModel, ordered_sites: list[int]
+    design_data: mujoco.MjData, model_xml: ModelXml, mujoco_model: mujoco.MjModel, ordered_sites: list[int]
 ) -> list[tuple[int, ...]]:
     """Numbers of the sites of every axle, from the front. Raises InputError where they do not form axles."""
     axles, x = [ordered_sites[:1]], design_data.site_xpos[:, 0]
@@ -136,7 +136,7 @@ def _axles(
 
 
 def _check_axle(
-    design_data: mujoco.MjData, model_xml: Document, mujoco_model: mujoco.MjModel, sites: list[int]
+    design_data: mujoco.MjData, model_xml: ModelXml, mujoco_model: mujoco.MjModel, sites: list[int]
 ) -> None:
     """Raise InputError unless an axle has a left and a right wheel, or one wheel in the middle."""
     y, at = design_data.site_xpos[sites, 1], f"the axle at x = {design_data.site_xpos[sites[0], 0]:.6g} m"
@@ -163,7 +163,7 @@ def _check_axle(
         )
 
 
-def _tyre_numbers(mujoco_model: mujoco.MjModel, model_xml: Document, site: int) -> tuple[float, float, float]:
+def _tyre_numbers(mujoco_model: mujoco.MjModel, model_xml: ModelXml, site: int) -> tuple[float, float, float]:
     """Stiffness (N/m), damping (N s/m) and cornering stiffness (N/rad) from a site's ``user`` attribute."""
     numbers = np.zeros(3)
     given = mujoco_model.site_user[site][:3] if mujoco_model.nuser_site else numbers[:0]

@@ -42,7 +42,7 @@ class XmlElement:
 
 
 @dataclass(frozen=True)
-class Document:
+class ModelXml:
     """A checked model file. path; kind : "MJCF" or "URDF"; elements : of the file and all that it includes, in their
     order; urdf : of a URDF, the text that MuJoCo gets."""
 
@@ -65,7 +65,7 @@ class Document:
 
 
 @dataclass
-class _Reader:
+class _XmlReader:
     path: Path
     elements: list[XmlElement] = field(default_factory=list)
     enclosing_tags: list[str] = field(default_factory=list)
@@ -106,7 +106,7 @@ class _Folders(NamedTuple):
     elements: list[XmlElement]
 
 
-def checked_document(model_path: Path, allowed_folder: Path | None = None) -> Document:
+def checked_document(model_path: Path, allowed_folder: Path | None = None) -> ModelXml:
     """Elements of a model file after checks. Raises InputError for content that must not reach the parser.
 
     allowed_folder : in which all files must lie that the model names; its own if None.
@@ -116,7 +116,7 @@ def checked_document(model_path: Path, allowed_folder: Path | None = None) -> Do
     if not base.is_relative_to(allowed):
         raise InputError("--folder", "", str(allowed_folder), f"must be a folder that holds {model_path}")
     content = _file_content(model_path)
-    root = _Reader(model_path).read(content)[0]
+    root = _XmlReader(model_path).read(content)[0]
     if root.tag not in FORMAT_OF_ROOT:
         part = f": <{PART_ROOT}> is a part of other models: give the model that includes it"
         told = f"must be <mujoco> (MJCF) or <robot> (URDF){part if root.tag == PART_ROOT else ''}"
@@ -125,7 +125,7 @@ def checked_document(model_path: Path, allowed_folder: Path | None = None) -> Do
     folders = _Folders(allowed, base, [])
     _read_elements(model_path, urdf.text.encode() if urdf else content, folders, elements, 0)
     _check_assets(folders)
-    return Document(model_path, FORMAT_OF_ROOT[root.tag], tuple(elements), urdf)
+    return ModelXml(model_path, FORMAT_OF_ROOT[root.tag], tuple(elements), urdf)
 
 
 def _file_content(xml_path: Path) -> bytes:
@@ -148,7 +148,7 @@ def _read_model(xml_path: Path, include_folders: _Folders, elements: list[XmlEle
 def _read_elements(
     xml_path: Path, file_content: bytes, include_folders: _Folders, elements: list[XmlElement], include_depth: int
 ) -> None:
-    for element in _Reader(xml_path).read(file_content):
+    for element in _XmlReader(xml_path).read(file_content):
         elements.append(element)
         include_folders.elements.append(element)
         place = f"line {element.line}"

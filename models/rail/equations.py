@@ -28,7 +28,7 @@ from scipy.optimize import brentq, root
 from models.contact.inputs import Array, checked_number, checked_quantity
 from models.core.errors import InputError, RunFailed
 from models.core.resolved import check_resolved
-from models.core.steps import divides
+from models.core.steps import step_divides
 from models.core.trajectory import Trajectory
 from models.machine.compiled import lean, njit
 from models.machine.records import size_of
@@ -429,7 +429,7 @@ class WheelsetEquations:
                 f"must be above 0 and at most {ALLOWED_STEP_RATE / self._fastest_rate:.3g} s: the "
                 f"fastest motion has a rate of {self._fastest_rate:.4g} 1/s",
             )
-        if not divides(time_step, checked_number("duration", duration, "a time in s")):
+        if not step_divides(time_step, checked_number("duration", duration, "a time in s")):
             raise InputError("", "duration", duration, f"must be a whole number of steps of {time_step:g} s, 1 or more")
         count = round(duration / time_step)
         if (

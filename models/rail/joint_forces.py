@@ -13,7 +13,7 @@ import numpy as np
 
 from models.contact.inputs import Array
 from models.machine.compiled import inlined, njit
-from models.machine.records import record, records, size_of
+from models.machine.records import record, records_at_pointer, size_of
 from models.machine.stack import array, at, beyond
 from models.rail.equations import (
     ANGLE,
@@ -55,7 +55,7 @@ def joint_force_table(speed: float, rails: RailsAndWheels) -> Array:
 @inlined
 def rails_from_table(table_pointer):
     """``RailsAndWheels`` as views of the table at a pointer to doubles."""
-    head = records(table_pointer, 1, TABLE_HEAD)[0]
+    head = records_at_pointer(table_pointer, 1, TABLE_HEAD)[0]
     nodes, knots, strips, cells = int(head.nodes), int(head.knots), int(head.strips), int(head.cells)
     wheels = beyond(table_pointer, HEAD_SIZE)
     profile = beyond(wheels, WHEELS_SIZE)
@@ -64,11 +64,11 @@ def rails_from_table(table_pointer):
     first_strip = beyond(first_knot, KNOT_SIZE * knots)
     first_cell = beyond(first_strip, PER_STRIP * strips)
     return RailsAndWheels(
-        records(wheels, 1, WHEELS_RECORD),
+        records_at_pointer(wheels, 1, WHEELS_RECORD),
         LaidProfile(
-            records(profile, 1, PROFILE_COUNTS),
-            records(first_node, nodes, WHEEL_NODE_RECORD),
-            records(first_knot, knots, RAIL_KNOT_RECORD),
+            records_at_pointer(profile, 1, PROFILE_COUNTS),
+            records_at_pointer(first_node, nodes, WHEEL_NODE_RECORD),
+            records_at_pointer(first_knot, knots, RAIL_KNOT_RECORD),
         ),
         array(first_strip, (PER_STRIP, strips)),
         array(first_cell, (PER_CELL, cells)),
@@ -109,7 +109,7 @@ def joint_forces(table_pointer, t, q, v, forces_out):
 
     The forces are NaN where the wheelset has left the track, because engines do not check before they continue.
     """
-    rails, speed = rails_from_table(table_pointer), records(table_pointer, 1, TABLE_HEAD)[0].speed
+    rails, speed = rails_from_table(table_pointer), records_at_pointer(table_pointer, 1, TABLE_HEAD)[0].speed
     y, z, yaw, roll, _ = array(q, (JOINTS,))
     y_rate, z_rate, yaw_rate, roll_rate, spin = array(v, (JOINTS,))
     joint_forces_view = array(forces_out, (JOINTS,))

@@ -19,7 +19,7 @@ from models.road.excitation import RoadExcitation
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.linear_vehicle import LinearVehicle, eigenvalues
 from models.vehicles.spatial import Curve, PartOutput, SpatialOutput, SpatialVehicle, SpringDamper, Tyre, TyreOutput
-from models.vehicles.spatial_linear import Gains, linearise, preloads
+from models.vehicles.spatial_linear import Gains, linearise, static_preloads
 
 LARGEST_RATE_TIMES_STEP, LARGEST_STIFF_RATE_TIMES_STEP = 0.25, 0.5
 """Largest products of step and fastest rate: of the statistically linearised vehicle, and of the vehicle with its
@@ -296,7 +296,7 @@ def _part_of_output(vehicle_output: SpatialOutput) -> str:
 
 def _pushing_tyres(vehicle: SpatialVehicle, tyres: Sequence[Tyre], wheel_rises: np.ndarray) -> PushingTyres:
     """``PushingTyres`` of tyres that only push; ``wheel_rises`` (u, n) : rise of each tyre's wheel per coordinate."""
-    loads = preloads(vehicle).tyres if tyres else {}
+    loads = static_preloads(vehicle).tyres if tyres else {}
     load, stiffness, damping = (
         np.array([(loads[tyre.name], tyre.stiffness, tyre.damping) for tyre in tyres], dtype=float)
         .reshape(-1, 3)

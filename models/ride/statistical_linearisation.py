@@ -347,7 +347,9 @@ def _vehicle_under_forces(
     of the forces on the outputs."""
     no_roads = np.zeros(len(output_rows))
     outputs = tuple(
-        Output(o.name, o.unit, o.kind, o.acceleration_factors, o.rate_factors, o.displacement_factors, read, no_roads)
+        LinearOutput(
+            o.name, o.unit, o.kind, o.acceleration_factors, o.rate_factors, o.displacement_factors, read, no_roads
+        )
         for o, read in zip(linearised_vehicle.outputs, direct_effects, strict=True)
     )
     wheels = tuple(WheelPosition(str(i), 0.0, 0.0, 0) for i in range(len(output_rows)))

@@ -23,7 +23,7 @@ from models.contact.fastsim_many import fill_contact_forces, fill_contact_forces
 from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, MarchWorkspace, cells_in, strips_in
 from models.core.errors import InputError
 from models.machine.compiled import lean
-from models.machine.records import records, stacked
+from models.machine.records import records_at_pointer, stack_records
 from models.machine.stack import start
 
 FADING_SPEED = 0.1
@@ -63,15 +63,18 @@ def tyre_forces(patch_contacts, sliding_velocities, grid_strips, cell_count, mid
     tread (m/s); grid_strips, cell_count, middle_pressure : the patch's net as ``FastsimGrid`` holds it.
     """
     w = len(patch_contacts)
-    patches, answers = records(start(patch_contacts), w, CONTACT), records(start(forces_out), w, FORCES)
+    patches, answers = (
+        records_at_pointer(start(patch_contacts), w, CONTACT),
+        records_at_pointer(start(forces_out), w, FORCES),
+    )
     lines, cell_table = strips_in(grid_strips), cells_in(cell_count, middle_pressure)
-    room, slowest = MarchWorkspace(stacked(w, SLIP), stacked(1, BLOCK)), FADING_SPEED
+    room, slowest = MarchWorkspace(stack_records(w, SLIP), stack_records(1, BLOCK)), FADING_SPEED
     for i in range(w):
         slowest = min(slowest, sliding_velocities[i, 3])
     _creepages(1.0, patches, sliding_velocities)
     fill_contact_forces_in_place(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, answers)
     if slowest < FADING_SPEED:
-        backwards = stacked(w, FORCES)
+        backwards = stack_records(w, FORCES)
         _creepages(-1.0, patches, sliding_velocities)
         fill_contact_forces_in_place(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, backwards)
         _blend_directions(sliding_velocities, backwards, answers)

@@ -15,8 +15,8 @@ import numpy as np
 from models.core.errors import InputError
 from models.vehicles.free_vehicle import with_chassis_as_parent
 from models.vehicles.sliding_springs import sliding_springs
-from models.vehicles.spatial import AntiRollBar, Body, Curve, SpatialVehicle, SpringDamper, Vector, steiner
-from models.vehicles.spatial_linear import Preloads, preloads
+from models.vehicles.spatial import AntiRollBar, Body, Curve, SpatialVehicle, SpringDamper, Vector, point_mass_inertia
+from models.vehicles.spatial_linear import Preloads, static_preloads
 
 GRAVITY = 9.81
 X, Y, Z, HEADING, PITCH, ROLL = range(6)
@@ -25,7 +25,7 @@ ANGLES = {"roll": ROLL, "pitch": PITCH, "heading": HEADING}
 
 
 @dataclass(frozen=True)
-class Element:
+class CutVehicleElement:
     """Spring, mount or bar of a cut vehicle: a force along an axis, positive in compression, or a moment.
 
     F = preload + stiffness d + damping d' + travel_force(d) + rate_force(d') + friction tanh(d' / friction_rate) with
@@ -48,7 +48,7 @@ class Element:
     friction: float = 0.0
     friction_rate: float = 1.0
 
-    def travel_gauge(self) -> "Element":
+    def travel_gauge(self) -> "CutVehicleElement":
         """A copy of the element whose force equals its travel d, so that a simulation records the travel."""
         straight = replace(self, travel_force=None, rate_force=None, friction=0.0)
         return replace(straight, stiffness=1.0, damping=0.0, preload=0.0)
@@ -77,7 +77,7 @@ class CutVehicle:
     chassis: str
     tree: SpatialVehicle
     uncut: SpatialVehicle
-    elements: tuple[Element, ...]
+    elements: tuple[CutVehicleElement, ...]
     loads: np.ndarray
 
     @property
@@ -91,27 +91,27 @@ class CutVehicle:
         return len(self.tree.coordinates())
 
 
-def cut(vehicle: SpatialVehicle, chassis_name: str) -> CutVehicle:
+def cut_at_hubs(vehicle: SpatialVehicle, chassis_name: str) -> CutVehicle:
     """The cut vehicle: the tyres of a vehicle whose body ``chassis_name`` has all six freedoms are removed. Raises
     InputError if the vehicle cannot be cut."""
-    _check(vehicle, chassis_name)
+    _check_can_be_cut(vehicle, chassis_name)
     sprung = sliding_springs(with_chassis_as_parent(vehicle, chassis_name))
     whole = replace(sprung, gravity=GRAVITY, drags=()).in_frame(chassis_name)
-    held = preloads(whole)
+    held = static_preloads(whole)
     loads = np.array([held.tyres[tyre.name] for tyre in whole.tyres])
-    return CutVehicle(chassis_name, _tree(whole, chassis_name), whole, elements_of(whole, held), loads)
+    return CutVehicle(chassis_name, _cut_vehicle_tree(whole, chassis_name), whole, elements_of(whole, held), loads)
 
 
-def elements_of(vehicle: SpatialVehicle, preloads: Preloads) -> tuple[Element, ...]:
+def elements_of(vehicle: SpatialVehicle, preloads: Preloads) -> tuple[CutVehicleElement, ...]:
     """Elements for the springs, then the bars, of a vehicle whose springs and bars all name their frames; preloads :
     their static forces."""
 
     def element(
         spring_or_bar: SpringDamper | AntiRollBar, first_body: str, second_body: str, *attachment_points: Vector
-    ) -> Element:
+    ) -> CutVehicleElement:
         first, second, axis = map(np.array, attachment_points)
         force = preloads.parts[spring_or_bar.name]
-        return Element(
+        return CutVehicleElement(
             spring_or_bar.name,
             first_body,
             second_body,
@@ -124,7 +124,7 @@ def elements_of(vehicle: SpatialVehicle, preloads: Preloads) -> tuple[Element, .
             str(spring_or_bar.frame),
         )
 
-    def bent(spring: SpringDamper) -> Element:
+    def bent(spring: SpringDamper) -> CutVehicleElement:
         straight = element(
             spring, spring.first_body, str(spring.second_body), spring.first_point, spring.second_point, spring.axis
         )
@@ -136,7 +136,7 @@ def elements_of(vehicle: SpatialVehicle, preloads: Preloads) -> tuple[Element, .
     return (*springs, *bars)
 
 
-def _tree(vehicle: SpatialVehicle, chassis_name: str) -> SpatialVehicle:
+def _cut_vehicle_tree(vehicle: SpatialVehicle, chassis_name: str) -> SpatialVehicle:
     """Bodies of the cut vehicle in tree order: massless carriers for heading and pitch, the chassis with roll, and all
     other bodies behind it."""
     body = vehicle.body(chassis_name)
@@ -149,7 +149,7 @@ def _tree(vehicle: SpatialVehicle, chassis_name: str) -> SpatialVehicle:
     return SpatialVehicle(vehicle.name, (*carriers, turned, *others), (), (), vehicle.axles, gravity=vehicle.gravity)
 
 
-def _check(vehicle: SpatialVehicle, chassis_name: str) -> None:
+def _check_can_be_cut(vehicle: SpatialVehicle, chassis_name: str) -> None:
     names = tuple(body.name for body in vehicle.bodies)
     if chassis_name not in names:
         raise InputError(vehicle.name, "chassis", chassis_name, "no such body", names)
@@ -234,5 +234,5 @@ def rigid_vehicle(vehicle: CutVehicle) -> RigidVehicle:
     inertia = np.zeros((3, 3))
     for body in bodies:
         arm = np.subtract(body.position, centre)
-        inertia += np.array(body.inertia) + steiner(body.mass, arm)
+        inertia += np.array(body.inertia) + point_mass_inertia(body.mass, arm)
     return RigidVehicle(mass, centre, inertia, np.array([tyre.point for tyre in vehicle.uncut.tyres]) - centre)

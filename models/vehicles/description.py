@@ -13,7 +13,7 @@ Geometry = Literal["exact", "linear"]
 
 
 @dataclass(frozen=True)
-class Body:
+class PlaneBody:
     """A rigid body that heaves and, if it has a pitch inertia, pitches.
 
     mass in kg; pitch_inertia in kg m^2 about the centre of mass, None for a body that does not pitch.
@@ -64,7 +64,7 @@ class PitchSpring:
 
 
 @dataclass(frozen=True)
-class Axle:
+class PlaneAxle:
     """Axle of a vehicle in the plane, where the road or a wheel force acts: its wheel body, and its position ahead of
     the chassis' centre (m)."""
 
@@ -74,13 +74,13 @@ class Axle:
 
 
 @dataclass(frozen=True)
-class Vehicle:
+class PlaneVehicle:
     """Vehicle that moves in the vertical plane: bodies, struts and axles; ``gravity`` (m/s^2) acts down; ``geometry``
     "exact" uses sin and cos of pitch."""
 
-    bodies: tuple[Body, ...]
+    bodies: tuple[PlaneBody, ...]
     struts: tuple[Strut, ...]
-    axles: tuple[Axle, ...]
+    axles: tuple[PlaneAxle, ...]
     gravity: float
     geometry: Geometry
     pitch_springs: tuple[PitchSpring, ...] = ()
@@ -96,7 +96,7 @@ class Vehicle:
         return (*heave, *((body.name, "pitch") for body in self.bodies if body.pitch_inertia is not None))
 
 
-def matrices(vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def mass_damping_stiffness(vehicle: PlaneVehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass, damping and stiffness matrices M, D, K of M q'' + D q' + K q = f, each (n, n) in the order of
     ``vehicle.coordinates()``.
 
@@ -109,7 +109,9 @@ def matrices(vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     mass = np.diag([inertias[coordinate] for coordinate in coordinates])
     damping, stiffness = np.zeros_like(mass), np.zeros_like(mass)
     for strut in vehicle.struts:
-        row = _vertical(strut.upper, coordinates) - _vertical(strut.lower, coordinates)
+        row = _vertical_displacement_row(strut.upper, coordinates) - _vertical_displacement_row(
+            strut.lower, coordinates
+        )
         damping += strut.damping * np.outer(row, row)
         stiffness += strut.stiffness * np.outer(row, row)
     for spring in (spring for spring in vehicle.pitch_springs if not spring.dead_band):
@@ -119,7 +121,7 @@ def matrices(vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return mass, damping, stiffness
 
 
-def _vertical(point: Point, coordinate_names: tuple[tuple[str, str], ...]) -> np.ndarray:
+def _vertical_displacement_row(point: Point, coordinate_names: tuple[tuple[str, str], ...]) -> np.ndarray:
     """Row (n,) that maps small coordinates to the vertical displacement of a point (m, down): z - x pitch."""
     row = np.zeros(len(coordinate_names))
     for i, (body, kind) in enumerate(coordinate_names):

@@ -44,7 +44,14 @@ def free_vehicle(
         for body in with_chassis_as_parent(vehicle, chassis.name).bodies
     ]
     bodies += [
-        Body(rotor(tyre.name), ROTOR_MASS, tyre.point, ("ry",), _about_y(spinning(tyre, spin_inertia)), tyre.body)
+        Body(
+            rotor_name(tyre.name),
+            ROTOR_MASS,
+            tyre.point,
+            ("ry",),
+            _inertia_about_y(wheel_spin_inertia(tyre, spin_inertia)),
+            tyre.body,
+        )
         for tyre in vehicle.tyres
         if spin_inertia and tyre.name not in bodies_without_spin
     ]
@@ -55,12 +62,12 @@ def free_vehicle(
     return free.in_frame(CARRIER)
 
 
-def spinning(tyre: Tyre, spin_inertia: float) -> float:
+def wheel_spin_inertia(tyre: Tyre, spin_inertia: float) -> float:
     """Inertia (kg m^2) of a wheel about its axle: the tyre's own value, else ``spin_inertia``."""
     return spin_inertia if tyre.spin_inertia is None else tyre.spin_inertia
 
 
-def _about_y(inertia: float) -> tuple[Vector, Vector, Vector]:
+def _inertia_about_y(inertia: float) -> tuple[Vector, Vector, Vector]:
     return (0.0, 0.0, 0.0), (0.0, inertia, 0.0), (0.0, 0.0, 0.0)
 
 
@@ -108,7 +115,7 @@ def _check_headings(vehicle: SpatialVehicle, chassis_name: str) -> None:
                 raise InputError(vehicle.name, f"bodies[{name}].freedoms", list(vehicle.body(name).freedoms), allowed)
 
 
-def rotor(tyre_name: str) -> str:
+def rotor_name(tyre_name: str) -> str:
     """Name of the rotating body of a wheel."""
     return f"{tyre_name} {ROTOR}"
 
@@ -123,7 +130,7 @@ def last_coordinate_and_joint(vehicle: SpatialVehicle, body_name: str) -> tuple[
     return (-1, (0.0, 0.0, 0.0)) if given_body.parent is None else last_coordinate_and_joint(vehicle, given_body.parent)
 
 
-def joints(vehicle: SpatialVehicle) -> np.ndarray:
+def joint_table(vehicle: SpatialVehicle) -> np.ndarray:
     """Joint table (n, 5) of a vehicle with a row per coordinate: its kind (index in FREEDOMS), the coordinate below it
     (-1: none), and the vector (m) from the joint below to its own in the design position."""
     rows = []

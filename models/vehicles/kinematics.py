@@ -29,7 +29,7 @@ class Kinematics:
         self._index = {coordinate: i for i, coordinate in enumerate(vehicle.coordinates())}
         self.size = len(self._index)
         bodies = ((body.name, body.parent, body.position, body.freedoms) for body in vehicle.bodies)
-        self._shifts = _shifts_of(tuple(bodies))
+        self._shifts = _displacement_cache(tuple(bodies))
 
     def coordinate(self, body_name: str, freedom: str) -> np.ndarray:
         """Row (n,) that selects a coordinate from all coordinates q; zeros if the body does not have it."""
@@ -112,7 +112,9 @@ class Kinematics:
 
 
 @lru_cache(maxsize=16)
-def _shifts_of(bodies: tuple[tuple[str, str | None, Vector, tuple[str, ...]], ...]) -> dict[SpringEnd, np.ndarray]:
+def _displacement_cache(
+    bodies: tuple[tuple[str, str | None, Vector, tuple[str, ...]], ...],
+) -> dict[SpringEnd, np.ndarray]:
     """Cache of points' displacements (3, n), shared by all vehicles with the same ``bodies``: name, parent, position
     and freedoms."""
     return {}

@@ -20,7 +20,7 @@ class WheelPosition:
 
 
 @dataclass(frozen=True)
-class Output:
+class LinearOutput:
     """Output quantity of a linear vehicle: a linear function of the vehicle's motion and of the road.
 
     acceleration_factors, rate_factors, displacement_factors (n,): of q'', q', q. road_factors, road_rate_factors (w,):
@@ -39,8 +39,8 @@ class Output:
 
 
 class OutputRows(NamedTuple):
-    """Factors of all outputs of a linear vehicle as matrices, each row that of one ``Output``: (p, n), and (p, w) for
-    those of the road."""
+    """Factors of all outputs of a linear vehicle as matrices, each row that of one ``LinearOutput``: (p, n), and (p, w)
+    for those of the road."""
 
     acceleration_factors: np.ndarray
     rate_factors: np.ndarray
@@ -65,7 +65,7 @@ class LinearVehicle:
     road_damping: np.ndarray
     coordinates: tuple[tuple[str, str], ...]
     wheels: tuple[WheelPosition, ...]
-    outputs: tuple[Output, ...]
+    outputs: tuple[LinearOutput, ...]
     source: str = "analytic"
 
     @property

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from models.core.strict import Strict, quantity
-from models.vehicles.description import Axle, Body, Geometry, Point, Strut, Vehicle
+from models.vehicles.description import Geometry, PlaneAxle, PlaneBody, PlaneVehicle, Point, Strut
 
 STATES = ("z1", "z2", "z3", "pitch")
 """Names of the vehicle's four coordinates; its state consists of these and their rates."""
@@ -18,7 +18,7 @@ STATE_NAMES = (*STATES, *(f"{name}_rate" for name in STATES))
 """Names of the eight states, which are also the names of their channels."""
 
 
-class Parameters(Strict):
+class PitchPlaneParameters(Strict):
     """Parameters of the pitch-plane vehicle, with the paper's symbols (Appendix B)."""
 
     a: float = quantity("m", "centre of mass to rear axle")
@@ -42,12 +42,12 @@ class Parameters(Strict):
         return np.array([getattr(self, name) for name in type(self).model_fields])
 
 
-def describe(parameters: Parameters, geometry: Geometry = "exact") -> Vehicle:
+def pitch_plane_vehicle(parameters: PitchPlaneParameters, geometry: Geometry = "exact") -> PlaneVehicle:
     """Description of the pitch-plane vehicle on its tyres, over a flat road, as bodies and struts."""
     bodies = (
-        Body("wheel1", parameters.m1),
-        Body("wheel2", parameters.m2),
-        Body("chassis", parameters.m3, parameters.I),
+        PlaneBody("wheel1", parameters.m1),
+        PlaneBody("wheel2", parameters.m2),
+        PlaneBody("chassis", parameters.m3, parameters.I),
     )
     front, rear, ground = Point("wheel1"), Point("wheel2"), Point(None)
     struts = (
@@ -56,11 +56,11 @@ def describe(parameters: Parameters, geometry: Geometry = "exact") -> Vehicle:
         Strut("suspension3", Point("chassis", parameters.b), front, parameters.k3, parameters.d3),
         Strut("suspension4", Point("chassis", -parameters.a), rear, parameters.k4, parameters.d4),
     )
-    axles = (Axle("front", "wheel1", parameters.b), Axle("rear", "wheel2", -parameters.a))
-    return Vehicle(bodies, struts, axles, parameters.g, geometry)
+    axles = (PlaneAxle("front", "wheel1", parameters.b), PlaneAxle("rear", "wheel2", -parameters.a))
+    return PlaneVehicle(bodies, struts, axles, parameters.g, geometry)
 
 
-def equilibrium(parameters: Parameters, geometry: Geometry = "exact") -> np.ndarray:
+def equilibrium(parameters: PitchPlaneParameters, geometry: Geometry = "exact") -> np.ndarray:
     """Static equilibrium of the pitch-plane vehicle on the flat road: state, shape (8,), with zero rates.
 
     Closed form: the axle loads follow from the moment about the other axle, and the two strut lengths

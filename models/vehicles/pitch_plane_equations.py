@@ -1,7 +1,7 @@
 """Equations of motion of the pitch-plane vehicle, written straight from the paper (eqs 35 to 39).
 
 Each right-hand side takes the state y (8,), the inputs u of its mode, the parameters p (15,) in the
-order of ``pitch_plane.Parameters`` and fills the state's rates (8,). They are plain functions that numba
+order of ``PitchPlaneParameters`` and fills the state's rates (8,). They are plain functions that numba
 can compile into a caller, which keeps them cacheable.
 
 | mode | input u | equation |
@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from models.vehicles.description import Geometry, Vehicle
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.description import Geometry, PlaneVehicle
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 
-def parameter_numbers(parameters: Parameters, vehicle: Vehicle) -> np.ndarray:
+def parameter_numbers(parameters: PitchPlaneParameters, vehicle: PlaneVehicle) -> np.ndarray:
     """Array of numbers for the compiled equations: the parameters (15,), then stiffness, damping and dead band of each
     pitch spring."""
     springs = [(spring.stiffness, spring.damping, spring.dead_band) for spring in vehicle.pitch_springs]
@@ -39,7 +39,7 @@ def suspension_forces(y, p, pitch_sine, pitch_cosine):
     return f3, f4
 
 
-def suspension_loads(y: Any, p: Parameters, geometry: Geometry) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def suspension_loads(y: Any, p: PitchPlaneParameters, geometry: Geometry) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Suspension forces f3, f4 (N, compression) and their moment on the chassis (N m, nose up), (n,) each, at states y,
     eight arrays (n,); eqs (35), (36)."""
     exact = geometry == "exact"

@@ -16,7 +16,7 @@ from models.core.errors import InputError
 from models.core.finding import Finding
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre
-from models.vehicles.spatial_linear import mass, preloads, slopes_at_rest, static_stiffness
+from models.vehicles.spatial_linear import design_mass_matrix, slopes_at_rest, static_preloads, static_stiffness
 
 GRAVITY = 9.81
 USUAL_MASS = 30.0, 60e3
@@ -75,7 +75,7 @@ class VehicleFigures:
     @cached_property
     def static_forces(self) -> dict[str, float]:
         """Static forces of all tyres, springs and bars, N; InputError if a weight is not supported."""
-        preloaded = preloads(replace(self.vehicle, gravity=GRAVITY))
+        preloaded = static_preloads(replace(self.vehicle, gravity=GRAVITY))
         return preloaded.parts | preloaded.tyres
 
     @cached_property
@@ -104,15 +104,19 @@ class VehicleFigures:
         return any(e.stiffness and body in chain for e in self.vehicle.joint_elements for body, _ in e.coordinates)
 
 
-def plausible(vehicle: SpatialVehicle, accepted_queries: Sequence[str] = ()) -> tuple[Finding, ...]:
+def implausible_values(vehicle: SpatialVehicle, accepted_queries: Sequence[str] = ()) -> tuple[Finding, ...]:
     """Findings on implausible values of a vehicle, in SI units, without those that the user has accepted; empty for an
     ordinary vehicle."""
     whole = VehicleFigures(vehicle)
-    queries = (query for look in (_masses, _sizes, _inertias, _struts, _statics) for query in look(whole))
+    queries = (
+        query
+        for look in (_mass_findings, _size_findings, _inertia_findings, _strut_findings, _static_findings)
+        for query in look(whole)
+    )
     return tuple(query for query in queries if query.check not in accepted_queries)
 
 
-def _query(check_name: str, entry_name: str, query_text: str, size_of_doubt: float, unit: str) -> Finding:
+def _finding(check_name: str, entry_name: str, query_text: str, size_of_doubt: float, unit: str) -> Finding:
     return Finding(check_name, "doubt", entry_name, f"{entry_name}: {query_text}.", size_of_doubt, unit)
 
 
@@ -120,13 +124,13 @@ def _is_unusual(value: float, usual_range: tuple[float, float]) -> bool:
     return not usual_range[0] <= value <= usual_range[1]
 
 
-def _masses(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
+def _mass_findings(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     if _is_unusual(vehicle_figures.total_mass, USUAL_MASS):
-        yield _query(
+        yield _finding(
             "mass",
             "mass of the vehicle",
             f"{vehicle_figures.total_mass:.4g} kg; usual are {USUAL_MASS[0]:g} to {USUAL_MASS[1]:g} kg. "
-            f"{_tonnes(vehicle_figures.total_mass)}",
+            f"{_text_in_tonnes(vehicle_figures.total_mass)}",
             vehicle_figures.total_mass,
             "kg",
         )
@@ -136,32 +140,34 @@ def _masses(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
         and not _is_unusual(vehicle_figures.total_mass, USUAL_MASS)
         and vehicle_figures.total_mass - unsprung < LEAST_SPRUNG_RATIO * unsprung
     ):
-        yield _query(
+        yield _finding(
             "mass",
             f"bodies[{vehicle_figures.sprung_body.name}].mass",
             f"{vehicle_figures.sprung_body.mass:.4g} kg; all that is carried "
             f"weighs {vehicle_figures.total_mass - unsprung:.4g} kg, wheels and axles {unsprung:.4g} kg. "
-            f"{_tonnes(vehicle_figures.sprung_body.mass)}",
+            f"{_text_in_tonnes(vehicle_figures.sprung_body.mass)}",
             vehicle_figures.sprung_body.mass,
             "kg",
         )
 
 
-def _tonnes(mass_in_kg: float) -> str:
+def _text_in_tonnes(mass_in_kg: float) -> str:
     return "Masses are in kg, not in tonnes" if mass_in_kg < 100 else "Masses are in kg, not in g or lb"
 
 
-def _sizes(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
+def _size_findings(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     metres = "Lengths are in m, not in mm"
     for name, value, usual in (
         ("wheelbase", vehicle_figures.wheelbase, USUAL_WHEELBASE),
         ("track", vehicle_figures.track, USUAL_TRACK),
     ):
         if value and _is_unusual(value, usual):
-            yield _query("size", name, f"{value:.4g} m; usual are {usual[0]:g} to {usual[1]:g} m. {metres}", value, "m")
+            yield _finding(
+                "size", name, f"{value:.4g} m; usual are {usual[0]:g} to {usual[1]:g} m. {metres}", value, "m"
+            )
     for body in vehicle_figures.vehicle.bodies:
         if _is_unusual(body.position[2], (-0.01, LARGEST_HEIGHT)):
-            yield _query(
+            yield _finding(
                 "size",
                 f"bodies[{body.name}].position",
                 f"{body.position[2]:.4g} m above the ground; usual are 0 to {LARGEST_HEIGHT:g} m. {metres}",
@@ -170,7 +176,7 @@ def _sizes(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
             )
 
 
-def _inertias(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
+def _inertia_findings(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     """Findings on the inertia of the sprung body (radii of gyration) and on tensors that would need negative mass."""
     body, spans = (
         vehicle_figures.sprung_body,
@@ -181,7 +187,7 @@ def _inertias(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
         span, inertia = spans[freedom], about[freedom]
         radius = (inertia / body.mass) ** 0.5
         if span and freedom in body.freedoms and inertia and _is_unusual(radius / span, usual):
-            yield _query(
+            yield _finding(
                 "inertia",
                 f"bodies[{body.name}].inertia",
                 f"{inertia:.4g} kg m^2 about {freedom[1]} is a radius "
@@ -193,7 +199,7 @@ def _inertias(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     for each in vehicle_figures.vehicle.bodies:
         low, middle, high = sorted(np.diag(each.inertia).tolist())
         if low > 0 and high > 1.05 * (low + middle):
-            yield _query(
+            yield _finding(
                 "inertia",
                 f"bodies[{each.name}].inertia",
                 f"{high:.4g} kg m^2 about one axis is more than "
@@ -203,7 +209,7 @@ def _inertias(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
             )
 
 
-def _struts(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
+def _strut_findings(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     """Findings on wheels without a strut, and on struts far from their wheels."""
     for wheel, tyres in vehicle_figures.wheels.items():
         struts = vehicle_figures.struts(wheel)
@@ -211,7 +217,7 @@ def _struts(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
             continue
         if not any(slopes_at_rest(strut)[0] for strut in struts) and wheel != vehicle_figures.sprung_body.name:
             kind = "damper alone" if struts else "strut"
-            yield _query(
+            yield _finding(
                 "strut",
                 f"bodies[{wheel}]",
                 f"{'a' if struts else 'no'} {kind} holds the body up on it: a spring between them is missing",
@@ -222,7 +228,7 @@ def _struts(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
             apart = _distance_from_wheel(strut, wheel, tyres)
             if apart > FARTHEST_STRUT:
                 point = strut.first_point if strut.first_body == wheel else strut.second_point
-                yield _query(
+                yield _finding(
                     "strut",
                     f"springs[{strut.name}]",
                     f"its point {[round(x, 4) for x in point]} lies "
@@ -239,27 +245,27 @@ def _distance_from_wheel(strut: SpringDamper, wheel: str, tyres: tuple[Tyre, ...
     return float(np.hypot(x - tyres[0].point[0], max(min(beside) - y, y - max(beside), 0.0)))
 
 
-def _statics(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
+def _static_findings(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     """Findings on static loads and the values that follow from them; empty if masses or lengths are already
     implausible."""
-    if any(_masses(vehicle_figures)) or any(_sizes(vehicle_figures)):
+    if any(_mass_findings(vehicle_figures)) or any(_size_findings(vehicle_figures)):
         return
     try:
         vehicle_figures.static_forces  # noqa: B018
     except InputError as error:
-        yield _query("load", error.place, error.allowed, 0.0, "N")
+        yield _finding("load", error.place, error.allowed, 0.0, "N")
         return
-    yield from _loads(vehicle_figures)
-    yield from _frequencies(vehicle_figures)
-    yield from _dampers(vehicle_figures)
+    yield from _wheel_load_findings(vehicle_figures)
+    yield from _frequency_findings(vehicle_figures)
+    yield from _damping_findings(vehicle_figures)
 
 
-def _loads(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
+def _wheel_load_findings(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     weight, axles = vehicle_figures.total_mass * GRAVITY, dict[int, list[Tyre]]()
     for tyre in vehicle_figures.vehicle.tyres:
         axles.setdefault(tyre.axle, []).append(tyre)
         if vehicle_figures.static_forces[tyre.name] < 0:
-            yield _query(
+            yield _finding(
                 "load",
                 f"tyres[{tyre.name}]",
                 f"its static load is {vehicle_figures.static_forces[tyre.name]:.4g} N: the wheel "
@@ -271,7 +277,7 @@ def _loads(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
         loads = [vehicle_figures.static_forces[tyre.name] for tyre in tyres]
         names = " and ".join(tyre.name for tyre in tyres)
         if len(axles) > 1 and 0 <= sum(loads) < LEAST_AXLE_SHARE * weight:
-            yield _query(
+            yield _finding(
                 "load",
                 f"tyres[{names}]",
                 f"carry {sum(loads):.4g} N of {weight:.4g} N, "
@@ -281,7 +287,7 @@ def _loads(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
             )
         for what, unit, values in (("load", "N", loads), ("stiffness", "N/m", [tyre.stiffness for tyre in tyres])):
             if min(values) >= 0 and max(values) > LARGEST_WHEEL_RATIO * min(values):
-                yield _query(
+                yield _finding(
                     what,
                     f"tyres[{names}]",
                     f"the {what}s {min(values):.4g} and {max(values):.4g} {unit} of one "
@@ -291,14 +297,14 @@ def _loads(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
                 )
 
 
-def _frequencies(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
+def _frequency_findings(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     """Findings on the frequencies of the sprung body, from its static deflection, and of each wheel between road and
     body, and on the tyres' static deflections."""
     remedy = "Stiffness is in N/m, not in N/mm, mass in kg, not in tonnes"
     sunk = _static_deflection(vehicle_figures)
     bounce = (GRAVITY / sunk) ** 0.5 / (2 * np.pi) if sunk > 0 else float("inf")
     if _is_unusual(bounce, USUAL_BOUNCE_FREQUENCY):
-        yield _query(
+        yield _finding(
             "frequency",
             f"bodies[{vehicle_figures.sprung_body.name}]",
             f"sinks {sunk:.4g} m under the vehicle's weight, a "
@@ -310,7 +316,7 @@ def _frequencies(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     for wheel in vehicle_figures.wheels:
         hop = _hop_frequency(vehicle_figures, wheel)
         if hop is not None and _is_unusual(hop, USUAL_HOP_FREQUENCY):
-            yield _query(
+            yield _finding(
                 "frequency",
                 f"bodies[{wheel}]",
                 f"between road and body it hops at {hop:.3g} Hz; usual are {USUAL_HOP_FREQUENCY[0]:g} to "
@@ -321,7 +327,7 @@ def _frequencies(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     for tyre in vehicle_figures.vehicle.tyres:
         pressed = vehicle_figures.static_forces[tyre.name] / tyre.stiffness
         if pressed > 0 and _is_unusual(pressed, USUAL_TYRE_DEFLECTION):
-            yield _query(
+            yield _finding(
                 "frequency",
                 f"tyres[{tyre.name}].stiffness",
                 f"{tyre.stiffness:.4g} N/m gives way by "
@@ -350,10 +356,10 @@ def _hop_frequency(vehicle_figures: VehicleFigures, wheel: str) -> float | None:
     if not row.any() or wheel == vehicle_figures.sprung_body.name:
         return None
     stiffness = static_stiffness(replace(vehicle, bars=()), motion)
-    return float(np.sqrt((row @ stiffness @ row) / (row @ mass(vehicle) @ row)) / (2 * np.pi))
+    return float(np.sqrt((row @ stiffness @ row) / (row @ design_mass_matrix(vehicle) @ row)) / (2 * np.pi))
 
 
-def _dampers(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
+def _damping_findings(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
     """Findings on the damping ratios of struts with the mass that rests on them."""
     struts = {strut.name: strut for wheel in vehicle_figures.wheels for strut in vehicle_figures.struts(wheel)}
     for name, strut in struts.items():
@@ -362,7 +368,7 @@ def _dampers(vehicle_figures: VehicleFigures) -> Iterator[Finding]:
             continue
         share = strut.damping / (2 * (stiffness * load / GRAVITY) ** 0.5)
         if _is_unusual(share, USUAL_DAMPING_RATIO):
-            yield _query(
+            yield _finding(
                 "damping",
                 f"springs[{name}].damping",
                 f"{strut.damping:.4g} N s/m is {share:.2g} of the "

@@ -3,20 +3,22 @@
 from collections.abc import Sequence
 
 from models.core.finding import Finding
-from models.vehicles.pitch_plane import Parameters
-from models.vehicles.plausible import plausible
+from models.vehicles.pitch_plane import PitchPlaneParameters
+from models.vehicles.plausible import implausible_values
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre
 
 UP = (0.0, 0.0, 1.0)
 
 
-def plausible_plane(parameters: Parameters, accepted_queries: Sequence[str] = ()) -> tuple[Finding, ...]:
-    """Findings on implausible values of a pitch-plane parameter set, as ``plausible`` gives them, under the parameters'
-    symbols."""
-    return plausible(equivalent_spatial_vehicle(parameters), accepted_queries)
+def implausible_plane_values(
+    parameters: PitchPlaneParameters, accepted_queries: Sequence[str] = ()
+) -> tuple[Finding, ...]:
+    """Findings on implausible values of a pitch-plane parameter set, as ``implausible_values`` gives them, under the
+    parameters' symbols."""
+    return implausible_values(equivalent_spatial_vehicle(parameters), accepted_queries)
 
 
-def equivalent_spatial_vehicle(parameters: Parameters) -> SpatialVehicle:
+def equivalent_spatial_vehicle(parameters: PitchPlaneParameters) -> SpatialVehicle:
     """Vehicle in space without width that is equivalent to a pitch-plane parameter set.
 
     Its wheels are 0.3 m and its chassis 0.6 m above the ground, which has no influence. Its parts have the names of the

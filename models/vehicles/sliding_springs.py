@@ -15,15 +15,15 @@ from models.vehicles.spatial import FREEDOMS, JointElement, SpatialVehicle, Spri
 def sliding_springs(vehicle: SpatialVehicle) -> SpatialVehicle:
     """The vehicle with equivalent spring-dampers in place of all joint elements. Raises InputError if one cannot be
     replaced."""
-    springs = tuple(_spring(vehicle, element) for element in vehicle.joint_elements)
+    springs = tuple(_spring_along_slides(vehicle, element) for element in vehicle.joint_elements)
     return replace(vehicle, springs=(*vehicle.springs, *springs), joint_elements=())
 
 
-def _spring(vehicle: SpatialVehicle, element: JointElement) -> SpringDamper:
+def _spring_along_slides(vehicle: SpatialVehicle, element: JointElement) -> SpringDamper:
     bodies = tuple(dict.fromkeys(body for body, _ in element.coordinates))
     carriers = {vehicle.body(body).parent for body in bodies}
     slides = all(not freedom.startswith("r") for _, freedom in element.coordinates)
-    rows = [_row(element, body) for body in bodies]
+    rows = [_translation_factors(element, body) for body in bodies]
     paired = len(bodies) == 1 or (len(bodies) == 2 and np.array_equal(rows[0], -rows[1]))
     carrier = carriers.pop()
     if element.inertia or not slides or not paired or carriers or carrier is None:
@@ -42,7 +42,7 @@ def _spring(vehicle: SpatialVehicle, element: JointElement) -> SpringDamper:
     return SpringDamper(element.name, *ends, *points, (x, y, z), *gains, frame=carrier)
 
 
-def _row(element: JointElement, body_name: str) -> np.ndarray:
+def _translation_factors(element: JointElement, body_name: str) -> np.ndarray:
     """Factors (3,) of a joint element for the translations of one body."""
     row = np.zeros(3)
     for (name, freedom), factor in zip(element.coordinates, element.factors, strict=True):

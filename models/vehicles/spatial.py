@@ -66,7 +66,7 @@ class JointElement:
     F = preload + stiffness d + damping d' + inertia d'' acts as -factor F on each of the ``coordinates`` (body,
     freedom). preload (N or N m), stiffness (N/m, N m/rad), damping (N s/m, N m s/rad), inertia (kg, kg m^2): of what
     turns with d alone, as the rotor of a gear motor does ("armature"). ``models.own_model`` reads them from MJCF and
-    URDF; in a vehicle of a scene ``preload`` is the preload that ``spatial_linear.preloads`` finds."""
+    URDF; in a vehicle of a scene ``preload`` is the preload that ``spatial_linear.static_preloads`` finds."""
 
     name: str
     coordinates: tuple[tuple[str, Freedom], ...]
@@ -127,10 +127,10 @@ class SpringDamper:
 
     acts as +F a at p1 on the first body and as -F a at p2 on the second (None: the ground). With the first above, the
     second below and a up, travel d and force F are positive in compression. F0 is the preload of
-    ``spatial_linear.preloads``, 0 without gravity. The two forces are equal and opposite; the couple (p1 - p2) x F a of
-    the pair is taken up by the frame, which keeps a. It is 0 where p2 - p1 is 0 or along a, as in most suspensions at
-    rest. Where it is not, as with a spring beside the wheel that it carries, bodies that turn together strain a spring
-    whose frame is the space.
+    ``spatial_linear.static_preloads``, 0 without gravity. The two forces are equal and opposite; the couple (p1 - p2) x
+    F a of the pair is taken up by the frame, which keeps a. It is 0 where p2 - p1 is 0 or along a, as in most
+    suspensions at rest. Where it is not, as with a spring beside the wheel that it carries, bodies that turn together
+    strain a spring whose frame is the space.
 
     first_point, second_point (m), stiffness (N/m), damping (N s/m), friction (N), friction_rate (m/s); frame: the body
     in whose axes a is fixed, None for the space."""
@@ -281,7 +281,7 @@ class TyreOutput:
 
 
 @dataclass(frozen=True)
-class Limits:
+class ReductionLimits:
     """Limits that make up a reduced vehicle, for small motion only: bodies without mass, rigid springs, locked
     freedoms.
 
@@ -298,7 +298,7 @@ class Limits:
         return bool(self.massless or self.rigid or self.locked)
 
 
-NO_LIMITS = Limits()
+NO_LIMITS = ReductionLimits()
 
 SpatialOutput = PointOutput | TurnOutput | PartOutput | TyreOutput
 
@@ -325,7 +325,7 @@ class SpatialVehicle:
     drags: tuple[Drag, ...] = ()
     outputs: tuple[SpatialOutput, ...] = ()
     gravity: float = 0.0
-    limits: Limits = NO_LIMITS
+    limits: ReductionLimits = NO_LIMITS
     joint_elements: tuple[JointElement, ...] = ()
     ranges: tuple[tuple[tuple[str, Freedom], float, float], ...] = ()
     notes: tuple[str, ...] = ()
@@ -375,6 +375,6 @@ def hitch_of(towed_body: str) -> str:
     return f"{towed_body} hitch"
 
 
-def steiner(mass: float, arm: np.ndarray) -> np.ndarray:
+def point_mass_inertia(mass: float, arm: np.ndarray) -> np.ndarray:
     """Inertia (3, 3) of a point mass (kg) at an arm (3,) in m, in kg m^2."""
     return mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))

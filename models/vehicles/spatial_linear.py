@@ -10,13 +10,13 @@ from scipy.linalg import null_space
 
 from models.core.errors import InputError
 from models.vehicles.kinematics import Kinematics
-from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
+from models.vehicles.linear_vehicle import LinearOutput, LinearVehicle, WheelPosition
 from models.vehicles.spatial import (
     AntiRollBar,
     JointElement,
-    Limits,
     PartOutput,
     PointOutput,
+    ReductionLimits,
     SpatialOutput,
     SpatialVehicle,
     SpringDamper,
@@ -40,11 +40,11 @@ def linearise(
     equivalent_gains : stiffness (N/m) and damping (N s/m) that stand for springs of these names instead of their slopes
     at rest, as statistical linearisation finds them; InputError for a name that no spring has."""
     motion = Kinematics(vehicle)
-    gains = _gains(vehicle)
+    gains = _gains_by_name(vehicle)
     for name in set(equivalent_gains or {}) - set(gains):
         raise InputError(vehicle.name, "equivalent", name, "no such spring", tuple(gains))
     gains |= equivalent_gains or {}
-    tyres = _tyres(vehicle, motion)
+    tyres = _tyre_rows(vehicle, motion)
     damping, stiffness = np.zeros((2, motion.size, motion.size))
     parts = _parts_by_name(vehicle, motion, gains)
     for row, k, c in (*parts.values(), *tyres.values()):
@@ -53,14 +53,14 @@ def linearise(
     stiffness += _geometric_stiffness(vehicle, motion)
     _add_speed_forces(vehicle, motion, speed, damping, stiffness)
     whole = LinearVehicle(
-        mass=mass(vehicle),
+        mass=design_mass_matrix(vehicle),
         damping=damping,
         stiffness=stiffness,
         road_stiffness=np.column_stack([k * row for row, k, _ in tyres.values()]),
         road_damping=np.column_stack([c * row for row, _, c in tyres.values()]),
         coordinates=vehicle.coordinates(),
         wheels=wheels(vehicle),
-        outputs=tuple(_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs),
+        outputs=tuple(_linear_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs),
         source="analytic, " + ("loaded" if vehicle.gravity else "unloaded"),
     )
     limits = vehicle.limits
@@ -76,14 +76,14 @@ def wheels(vehicle: SpatialVehicle) -> tuple[WheelPosition, ...]:
     return tuple(WheelPosition(tyre.name, tyre.point[0], tyre.point[1], tyre.axle) for tyre in vehicle.tyres)
 
 
-def outputs(vehicle: SpatialVehicle, kinematics: Kinematics) -> tuple[Output, ...]:
-    """``Output`` of every output of a vehicle: from the ``kinematics`` of points (possibly an engine's), and the slopes
-    of the springs at rest."""
-    parts, tyres = _parts_by_name(vehicle, kinematics, _gains(vehicle)), _tyres(vehicle, kinematics)
-    return tuple(_output(spec, vehicle, kinematics, parts, tyres) for spec in vehicle.outputs)
+def linear_outputs(vehicle: SpatialVehicle, kinematics: Kinematics) -> tuple[LinearOutput, ...]:
+    """``LinearOutput`` of every output of a vehicle: from the ``kinematics`` of points (possibly an engine's), and the
+    slopes of the springs at rest."""
+    parts, tyres = _parts_by_name(vehicle, kinematics, _gains_by_name(vehicle)), _tyre_rows(vehicle, kinematics)
+    return tuple(_linear_output(spec, vehicle, kinematics, parts, tyres) for spec in vehicle.outputs)
 
 
-def mass(vehicle: SpatialVehicle) -> np.ndarray:
+def design_mass_matrix(vehicle: SpatialVehicle) -> np.ndarray:
     """Mass matrix (n, n) of a vehicle in the design position: kg, kg m, kg m^2."""
     motion = Kinematics(vehicle)
     total = np.zeros((motion.size, motion.size))
@@ -114,7 +114,7 @@ class Preloads(NamedTuple):
     tyres: dict[str, float]
 
 
-def preloads(vehicle: SpatialVehicle) -> Preloads:
+def static_preloads(vehicle: SpatialVehicle) -> Preloads:
     """Preloads that hold a vehicle in its design position against gravity; that of a tyre is its static wheel load.
 
     Shares that several could bear are those of the linear statics: what each would carry had the unloaded vehicle
@@ -122,7 +122,7 @@ def preloads(vehicle: SpatialVehicle) -> Preloads:
     and would have to pull.
     """
     motion = Kinematics(vehicle)
-    parts, tyres = _parts_by_name(vehicle, motion, _gains(vehicle)), _tyres(vehicle, motion)
+    parts, tyres = _parts_by_name(vehicle, motion, _gains_by_name(vehicle)), _tyre_rows(vehicle, motion)
     stiffness = static_stiffness(vehicle, motion)
     weight = sum(body.mass * vehicle.gravity * motion.shift(body.name, body.position)[2] for body in vehicle.bodies)
     sunk = -np.linalg.lstsq(stiffness, weight, rcond=1e-12)[0]
@@ -146,7 +146,7 @@ DeformationRow = tuple[np.ndarray, float, float]
 """A spring, bar or tyre for small motion: row (n,) of its deformation per coordinate, stiffness, damping."""
 
 
-def _gains(vehicle: SpatialVehicle) -> dict[str, Gains]:
+def _gains_by_name(vehicle: SpatialVehicle) -> dict[str, Gains]:
     return {spring.name: slopes_at_rest(spring) for spring in vehicle.springs}
 
 
@@ -184,7 +184,7 @@ def _bar_twist_row(kinematics: Kinematics, bar: AntiRollBar) -> np.ndarray:
     return rolls - risen / bar.track + turning / bar.track
 
 
-def _tyres(vehicle: SpatialVehicle, kinematics: Kinematics) -> dict[str, DeformationRow]:
+def _tyre_rows(vehicle: SpatialVehicle, kinematics: Kinematics) -> dict[str, DeformationRow]:
     return {t.name: (kinematics.shift(t.body, t.point)[2], t.stiffness, t.damping) for t in vehicle.tyres}
 
 
@@ -196,7 +196,10 @@ def with_preloads(vehicle: SpatialVehicle, joint_preloads: Preloads) -> SpatialV
 
 def static_stiffness(vehicle: SpatialVehicle, kinematics: Kinematics) -> np.ndarray:
     """Stiffness (n, n) of springs, bars and tyres at rest, without gravity: N/m, N, N m."""
-    parts = (*_parts_by_name(vehicle, kinematics, _gains(vehicle)).values(), *_tyres(vehicle, kinematics).values())
+    parts = (
+        *_parts_by_name(vehicle, kinematics, _gains_by_name(vehicle)).values(),
+        *_tyre_rows(vehicle, kinematics).values(),
+    )
     return np.asarray(sum(k * np.outer(row, row) for row, k, _ in parts))
 
 
@@ -206,7 +209,7 @@ def _geometric_stiffness(vehicle: SpatialVehicle, kinematics: Kinematics) -> np.
     total = np.zeros((kinematics.size, kinematics.size))
     if not vehicle.gravity:
         return total
-    held = preloads(vehicle)
+    held = static_preloads(vehicle)
     for body in vehicle.bodies:
         total += body.mass * vehicle.gravity * kinematics.second_derivatives(body.name, body.position)[2]
     for spring in vehicle.springs:
@@ -262,14 +265,14 @@ UNITS = {
 """Unit of each kind of output; for an anti-roll bar, and for a joint element that rotates, rad, rad/s and N m."""
 
 
-def _output(
+def _linear_output(
     wanted_output: SpatialOutput,
     vehicle: SpatialVehicle,
     kinematics: Kinematics,
     part_rows: Mapping[str, DeformationRow],
     tyre_rows: Mapping[str, DeformationRow],
-) -> Output:
-    """``Output`` with the factors of an output of the vehicle."""
+) -> LinearOutput:
+    """``LinearOutput`` with the factors of an output of the vehicle."""
     rows = np.zeros((3, kinematics.size))  # of q, q', q''
     road = np.zeros((2, len(vehicle.tyres)))  # of z, z'
     unit, order = (
@@ -291,7 +294,7 @@ def _output(
         row, *force_gains = tyre_rows[wanted_output.tyre]
         gains = {"tyre force": force_gains, "tyre deflection": (1.0, 0.0)}[wanted_output.kind]
         rows[:2], road[:, list(tyre_rows).index(wanted_output.tyre)] = -np.outer(gains, row), gains
-    return Output(wanted_output.name, unit, wanted_output.kind, rows[2], rows[1], rows[0], road[0], road[1])
+    return LinearOutput(wanted_output.name, unit, wanted_output.kind, rows[2], rows[1], rows[0], road[0], road[1])
 
 
 def _is_angle(joint_element: JointElement) -> bool:
@@ -309,7 +312,7 @@ def reduced_vehicle(linear_vehicle: LinearVehicle, mass_matrix: np.ndarray, moti
         raise InputError("", "effects", None, "nothing is left that could move")
     moved = [factors @ motion_matrix for factors in linear_vehicle.read[:3]] if linear_vehicle.outputs else [()] * 3
     outputs = tuple(
-        Output(o.name, o.unit, o.kind, acceleration, rate, displacement, o.road_factors, o.road_rate_factors)
+        LinearOutput(o.name, o.unit, o.kind, acceleration, rate, displacement, o.road_factors, o.road_rate_factors)
         for o, acceleration, rate, displacement in zip(linear_vehicle.outputs, *moved, strict=True)
     )
     return replace(
@@ -330,10 +333,10 @@ def mass_matrix_without(vehicle: SpatialVehicle, massless_bodies: frozenset[str]
         replace(body, mass=0.0, inertia=((0.0,) * 3,) * 3) if body.name in massless_bodies else body
         for body in vehicle.bodies
     )
-    return mass(replace(vehicle, bodies=light))
+    return design_mass_matrix(replace(vehicle, bodies=light))
 
 
-def remaining_motions(vehicle: SpatialVehicle, reduction_limits: Limits) -> np.ndarray:
+def remaining_motions(vehicle: SpatialVehicle, reduction_limits: ReductionLimits) -> np.ndarray:
     """Matrix N (n, r) of the motions that remain to a reduced vehicle: unit vectors where only coordinates are locked,
     else a basis of motions that leave the rigid springs' lengths unchanged."""
     coordinates = vehicle.coordinates()

@@ -7,7 +7,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import mass
+from models.vehicles.spatial_linear import design_mass_matrix
 
 GROUND = "the ground"
 
@@ -39,7 +39,7 @@ def _check_connections(vehicle: SpatialVehicle, vehicle_file: str) -> None:
     """Raise InputError unless springs, tyres and bars connect every body to the ground, and no moving body is held by
     its joint alone."""
     beside = defaultdict[str, set[str]](set)
-    for first, two in _links(vehicle):
+    for first, two in _connected_bodies(vehicle):
         beside[first].add(two)
         beside[two].add(first)
     touched = set(beside)
@@ -59,7 +59,7 @@ def _check_connections(vehicle: SpatialVehicle, vehicle_file: str) -> None:
             raise InputError(vehicle_file, f"bodies[{body.name}]", None, said)
 
 
-def _links(vehicle: SpatialVehicle) -> list[tuple[str, str]]:
+def _connected_bodies(vehicle: SpatialVehicle) -> list[tuple[str, str]]:
     springs = [(spring.first_body, spring.second_body or GROUND) for spring in vehicle.springs]
     tyres = [(tyre.body, GROUND) for tyre in vehicle.tyres]
     bars = [(bar.body, end) for bar in vehicle.bars for end in (bar.left, bar.right)]
@@ -70,7 +70,7 @@ def _links(vehicle: SpatialVehicle) -> list[tuple[str, str]]:
 def _check_inertia(vehicle: SpatialVehicle, vehicle_file: str) -> None:
     """Raise InputError unless every freedom moves some inertia: the mass matrix, scaled to a unit diagonal, is positive
     definite."""
-    matrix, coordinates = mass(vehicle), vehicle.coordinates()
+    matrix, coordinates = design_mass_matrix(vehicle), vehicle.coordinates()
     for (name, freedom), inertia in zip(coordinates, matrix.diagonal(), strict=True):
         if inertia <= 0:
             said = f"nothing inert moves with the freedom {freedom}: give an inertia or leave the freedom out"

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.scene_file import existing_file, parse
+from models.core.scene_file import existing_file, parse_toml
 from models.core.strict import read
 from models.vehicles.spatial import (
     AntiRollBar,
     Body,
     Curve,
     Drag,
-    Limits,
     PartOutput,
     PointOutput,
+    ReductionLimits,
     SideForce,
     SpatialOutput,
     SpatialVehicle,
@@ -66,7 +66,7 @@ def load_vehicle(
     ``scene_path`` and ``key_path`` say who asked for it, for the message if there is none. allows_reduced_vehicle : may
     it have [reduced]? allows_towing : may it tow bodies by a hitch? Raises InputError."""
     path = vehicle_path(vehicle_name, scene_folder, scene_path, key_path)
-    vehicle = build_vehicle(parse(path), path.name)
+    vehicle = build_vehicle(parse_toml(path), path.name)
     if vehicle.limits and not allows_reduced_vehicle:
         raise InputError(
             scene_path,
@@ -84,23 +84,18 @@ def vehicle_path(vehicle_name: str, scene_folder: str | Path = ".", scene_path: 
     """Path of the file that ``load_vehicle`` reads for a vehicle. Raises InputError."""
     if not vehicle_name.endswith(".toml"):
         if vehicle_name not in shipped_vehicles():
-            raise InputError(
-                scene_path,
-                key_path,
-                vehicle_name,
-                "no such vehicle; a file of your own ends in .toml or .xml",
-                shipped_vehicles(),
-            )
+            allowed = "no such vehicle; a file of your own ends in .toml or .xml"
+            raise InputError(scene_path, key_path, vehicle_name, allowed, shipped_vehicles())
         return SHIPPED_FOLDER / f"{vehicle_name}.toml"
     return existing_file(vehicle_name, Path(scene_folder), scene_path, key_path)
 
 
 def build_vehicle(file_table: Mapping[str, Any], vehicle_file: str) -> SpatialVehicle:
     """The vehicle from nested tables as a TOML file contains them. Raises InputError for the first fault."""
-    return _Builder(_read(file_table, vehicle_file), vehicle_file).vehicle()
+    return _VehicleBuilder(_checked_tables(file_table, vehicle_file), vehicle_file).vehicle()
 
 
-def _read(file_table: Mapping[str, Any], vehicle_file: str) -> VehicleTable:
+def _checked_tables(file_table: Mapping[str, Any], vehicle_file: str) -> VehicleTable:
     """Checked tables of a vehicle file. An error inside a list of tables is reported with the name of the entry."""
     try:
         return read(VehicleTable, file_table, vehicle_file)
@@ -119,7 +114,7 @@ def _key_path(table_name: str, entry_name: object, entry_key: str = "") -> str:
     return f"{table_name}[{entry_name}]" + (f".{entry_key}" if entry_key else "")
 
 
-class _Builder:
+class _VehicleBuilder:
     """Builder of the parts of a vehicle from the tables of a vehicle file."""
 
     def __init__(self, vehicle_table: VehicleTable, vehicle_file: str) -> None:
@@ -156,7 +151,7 @@ class _Builder:
         check_vehicle(vehicle, self.file)
         return replace(vehicle, limits=self._limits(vehicle))
 
-    def _limits(self, vehicle: SpatialVehicle) -> Limits:
+    def _limits(self, vehicle: SpatialVehicle) -> ReductionLimits:
         table, places = self.tables.reduced or ReducedTable(), vehicle.coordinates()
         known = (
             ("massless", table.massless, "body", tuple(self.bodies)),
@@ -167,14 +162,12 @@ class _Builder:
             for name in names:
                 self._known_name(f"reduced.{key}", name, kind, choices)
         locked = frozenset(place for place in places if list(place) in table.locked)
-        return Limits(frozenset(table.massless), frozenset(table.rigid), locked)
+        return ReductionLimits(frozenset(table.massless), frozenset(table.rigid), locked)
 
-    def _require(
-        self, condition: Any, key_path: str, wrong_value: Any, allowed_text: str, allowed_names: Sequence[str] = ()
-    ) -> None:
+    def _require(self, condition: Any, key_path: str, value: Any, allowed: str, choices: Sequence[str] = ()) -> None:
         """Raise InputError unless the condition ``condition`` holds."""
         if not condition:
-            raise InputError(self.file, key_path, wrong_value, allowed_text, tuple(allowed_names))
+            raise InputError(self.file, key_path, value, allowed, tuple(choices))
 
     def _unique(self, table_name: str, entries: Sequence[Any], reserved_names: Sequence[str] = ()) -> None:
         names = [entry.name for entry in entries]
@@ -206,31 +199,26 @@ class _Builder:
             assert ready is not None
             (xx, yy, zz), (xy, xz, yz) = ready.inertia, ready.products
             inertia = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-            at, freedoms = _vector(ready.position), tuple(ready.freedoms)
+            at, freedoms = _vector_of_numbers(ready.position), tuple(ready.freedoms)
             whole = Body(ready.name, ready.mass, at, freedoms, inertia, ready.parent)
             if ready.hitch is not None:
-                hitch = self._hitch(whole, _vector(ready.hitch))
+                hitch = self._hitch(whole, _vector_of_numbers(ready.hitch))
                 done[hitch.name], whole = hitch, replace(whole, freedoms=(), parent=hitch.name)
             done[ready.name] = whole
             del waiting[ready.name]
-        return done | {s.name: Body(s.name, s.mass, _vector(s.position), ("z",)) for s in self.tables.seats}
+        return done | {s.name: Body(s.name, s.mass, _vector_of_numbers(s.position), ("z",)) for s in self.tables.seats}
 
-    def _hitch(self, towed_body: Body, hitch_point: Vector) -> Body:
+    def _hitch(self, body: Body, point: Vector) -> Body:
         """Massless body with the rotations of a towed body, at the point where its parent tows it."""
-        place, name = _key_path("bodies", towed_body.name), hitch_of(towed_body.name)
+        place, name = _key_path("bodies", body.name), hitch_of(body.name)
         self._require(
-            towed_body.parent,
-            f"{place}.hitch",
-            list(hitch_point),
-            "nothing tows it: name the body that does as its parent",
+            body.parent, f"{place}.hitch", list(point), "nothing tows it: name the body that does as its parent"
         )
-        turns = "rz" in towed_body.freedoms and all(freedom.startswith("r") for freedom in towed_body.freedoms)
-        self._require(
-            turns, f"{place}.freedoms", list(towed_body.freedoms), "a towed body turns about its hitch: rz, rx, ry"
-        )
+        turns = "rz" in body.freedoms and all(freedom.startswith("r") for freedom in body.freedoms)
+        self._require(turns, f"{place}.freedoms", list(body.freedoms), "a towed body turns about its hitch: rz, rx, ry")
         names = [each.name for each in (*self.tables.bodies, *self.tables.seats)]
         self._require(name not in names, f"{place}.hitch", name, "is the name of another body: the hitch needs it")
-        return Body(name, 0.0, hitch_point, towed_body.freedoms, parent=towed_body.parent)
+        return Body(name, 0.0, point, body.freedoms, parent=body.parent)
 
     def _towed_under(self, body_name: str | None) -> str | None:
         """Name of the towed body that is, or carries, the given body; None if there is none."""
@@ -252,27 +240,25 @@ class _Builder:
             self._require(name in named, _key_path("axles", name), None, "no tyre names this axle")
         return axles
 
-    def _spring(self, spring_table: SpringTable) -> SpringDamper:
-        place = _key_path("springs", spring_table.name)
-        ends, points = self._two_bodies(place, spring_table.bodies), self._points(place, spring_table)
-        axis = self._axis(place, spring_table, points)
-        gains = spring_table.stiffness, spring_table.damping
-        acts = any((*gains, spring_table.friction, spring_table.travel_force, spring_table.rate_force))
+    def _spring(self, spring: SpringTable) -> SpringDamper:
+        place = _key_path("springs", spring.name)
+        ends, points = self._two_bodies(place, spring.bodies), self._points(place, spring)
+        axis = self._axis(place, spring, points)
+        gains = spring.stiffness, spring.damping
+        acts = any((*gains, spring.friction, spring.travel_force, spring.rate_force))
         self._require(acts, f"{place}.stiffness", None, "is missing: neither spring, damper, curve nor friction")
-        travel, rate = (
-            self._curve(f"{place}.{key}", getattr(spring_table, key)) for key in ("travel_force", "rate_force")
-        )
+        travel, rate = (self._curve(f"{place}.{key}", getattr(spring, key)) for key in ("travel_force", "rate_force"))
         return SpringDamper(
-            spring_table.name,
+            spring.name,
             *ends,
             *points,
             axis,
             *gains,
             travel,
             rate,
-            spring_table.friction,
-            spring_table.friction_rate,
-            self._frame(place, spring_table.frame, ends),
+            spring.friction,
+            spring.friction_rate,
+            self._frame(place, spring.frame, ends),
         )
 
     def _frame(self, key_path: str, frame_name: str | None, end_bodies: tuple[str, str | None]) -> str | None:
@@ -294,7 +280,7 @@ class _Builder:
         both = (spring_table.point is None) != (spring_table.points is None)
         self._require(both, f"{key_path}.point", None, "give either point, the place of both ends, or points, both")
         first, second = (spring_table.point, spring_table.point) if spring_table.points is None else spring_table.points
-        return _vector(first), _vector(second)
+        return _vector_of_numbers(first), _vector_of_numbers(second)
 
     def _axis(self, key_path: str, spring_table: SpringTable, points: tuple[Vector, Vector]) -> Vector:
         """Unit vector of a spring's axis: the given direction, else from the second point to the first, else
@@ -303,12 +289,12 @@ class _Builder:
             return self._unit(f"{key_path}.direction", spring_table.direction)
         apart = np.subtract(*points)
         distance = float(np.linalg.norm(apart))
-        return _vector(apart / distance) if distance else (0.0, 0.0, 1.0)
+        return _vector_of_numbers(apart / distance) if distance else (0.0, 0.0, 1.0)
 
     def _unit(self, key_path: str, direction: Sequence[float]) -> Vector:
         length = float(np.linalg.norm(direction))
         self._require(length, key_path, list(direction), "a direction needs a length")
-        return _vector(np.array(direction) / length)
+        return _vector_of_numbers(np.array(direction) / length)
 
     def _curve(self, key_path: str, curve_table: CurveTable | None) -> Curve | None:
         if curve_table is None:
@@ -324,19 +310,19 @@ class _Builder:
 
     def _mounts(self) -> Iterator[SpringDamper]:
         for mount in self.tables.mounts:
-            ends, at = self._two_bodies(_key_path("mounts", mount.name), mount.bodies), _vector(mount.point)
+            ends, at = self._two_bodies(_key_path("mounts", mount.name), mount.bodies), _vector_of_numbers(mount.point)
             acts = any(mount.stiffness) or any(mount.damping)
             place = _key_path("mounts", mount.name, "stiffness")
             self._require(acts, place, mount.stiffness, "has neither spring nor damper")
             frame = self._frame(_key_path("mounts", mount.name), mount.frame, ends)
             for name, axis, k, c in zip("xyz", np.eye(3), mount.stiffness, mount.damping, strict=True):
-                yield SpringDamper(f"{mount.name}.{name}", *ends, at, at, _vector(axis), k, c, frame=frame)
+                yield SpringDamper(f"{mount.name}.{name}", *ends, at, at, _vector_of_numbers(axis), k, c, frame=frame)
 
     def _seat_spring(self, seat_table: SeatTable) -> SpringDamper:
         """Spring of a seat, with the occupant as first and the carrier as second body, so that force is positive in
         compression."""
         carrier = self._body(_key_path("seats", seat_table.name, "body"), seat_table.body)
-        at = _vector(seat_table.position)
+        at = _vector_of_numbers(seat_table.position)
         law, frame = (seat_table.stiffness, seat_table.damping), self._towed_under(carrier)
         return SpringDamper(seat_table.name, seat_table.name, carrier, at, at, (0.0, 0.0, 1.0), *law, frame=frame)
 
@@ -401,10 +387,10 @@ class _Builder:
         axis = self._unit(f"{place}.direction", output_table.direction)
         if kind.startswith("ang"):
             return TurnOutput(output_table.name, kind, name, axis)  # type: ignore[arg-type]
-        point = self.bodies[name].position if output_table.point is None else _vector(output_table.point)
+        point = self.bodies[name].position if output_table.point is None else _vector_of_numbers(output_table.point)
         return PointOutput(output_table.name, kind, name, point, axis)  # type: ignore[arg-type]
 
 
-def _vector(components: Any) -> Vector:
+def _vector_of_numbers(components: Any) -> Vector:
     x, y, z = map(float, components)
     return x, y, z

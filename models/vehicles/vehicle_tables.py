@@ -7,11 +7,11 @@ from pydantic import Field
 from models.core.strict import LARGEST_QUANTITY, Strict, quantity
 from models.vehicles.spatial import Freedom
 
-Number = Annotated[float, Field(ge=-LARGEST_QUANTITY, le=LARGEST_QUANTITY)]
+FiniteNumber = Annotated[float, Field(ge=-LARGEST_QUANTITY, le=LARGEST_QUANTITY)]
 Positive = Annotated[float, Field(gt=0, le=LARGEST_QUANTITY)]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST_QUANTITY)]
-Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
-NotNegativeTriple = Annotated[list[NotNegative], Field(min_length=3, max_length=3)]
+ThreeNumbers = Annotated[list[FiniteNumber], Field(min_length=3, max_length=3)]
+ThreeNotNegative = Annotated[list[NotNegative], Field(min_length=3, max_length=3)]
 Names = Annotated[list[str], Field(min_length=2, max_length=2)]
 Name = Annotated[str, Field(min_length=1)]
 
@@ -24,28 +24,30 @@ def quantity_list(unit: str, meaning: str, default: Any = ...) -> Any:
     return Field(default, description=meaning, json_schema_extra={"unit": unit})
 
 
-def _source() -> Any:
+def _source_field() -> Any:
     return Field("", description="where the values are from: published (where), measured, or chosen")
 
 
-class Entry(Strict):
+class NamedTable(Strict):
     """Keys that every table of a vehicle file has: a name, by which messages and outputs call it, and the source of its
     values."""
 
     name: Name
-    source: str = _source()
+    source: str = _source_field()
 
 
-class BodyTable(Entry):
+class BodyTable(NamedTable):
     """[[bodies]]: a rigid body, the position of its centre of mass and its freedoms."""
 
     mass: float = quantity("kg", "mass")
-    position: Triple = quantity_list("m", "centre of mass: x forward, y left, z above the ground")
+    position: ThreeNumbers = quantity_list("m", "centre of mass: x forward, y left, z above the ground")
     freedoms: list[Freedom] = Field(description="which of x, y, z, rx (roll), ry (pitch), rz (yaw) it has")
-    inertia: NotNegativeTriple = quantity_list("kg m^2", "Ixx, Iyy, Izz about its centre of mass", [0.0, 0.0, 0.0])
-    products: Triple = quantity_list("kg m^2", "Ixy, Ixz, Iyz as entries of the tensor, -int x z dm", [0.0, 0.0, 0.0])
+    inertia: ThreeNotNegative = quantity_list("kg m^2", "Ixx, Iyy, Izz about its centre of mass", [0.0, 0.0, 0.0])
+    products: ThreeNumbers = quantity_list(
+        "kg m^2", "Ixy, Ixz, Iyz as entries of the tensor, -int x z dm", [0.0, 0.0, 0.0]
+    )
     parent: str | None = Field(None, description="body it rides on; its freedoms then count relative to that body")
-    hitch: Triple | None = quantity_list(
+    hitch: ThreeNumbers | None = quantity_list(
         "m", "where its parent tows it, as a trailer: its freedoms are turns about it", None
     )
 
@@ -53,19 +55,19 @@ class BodyTable(Entry):
 class CurveTable(Strict):
     """{ at = [...], force = [...] }: straight lines through points and the origin, going on beyond the outer ones."""
 
-    at: list[Number] = Field(description="travel in m or its rate in m/s, rising", min_length=2)
-    force: list[Number] = Field(description="forces in N, one for each", min_length=2)
+    at: list[FiniteNumber] = Field(description="travel in m or its rate in m/s, rising", min_length=2)
+    force: list[FiniteNumber] = Field(description="forces in N, one for each", min_length=2)
 
 
-class SpringTable(Entry):
+class SpringTable(NamedTable):
     """[[springs]]: spring, damper, curves and friction between points of two bodies along a direction."""
 
     bodies: Names = Field(description='two bodies; the second may be "ground"')
-    point: Triple | None = quantity_list("m", "the place of both points", None)
-    points: Annotated[list[Triple], Field(min_length=2, max_length=2)] | None = quantity_list(
+    point: ThreeNumbers | None = quantity_list("m", "the place of both points", None)
+    points: Annotated[list[ThreeNumbers], Field(min_length=2, max_length=2)] | None = quantity_list(
         "m", "one point on each body", None
     )
-    direction: Triple | None = quantity_list(
+    direction: ThreeNumbers | None = quantity_list(
         "", "up where nothing else is said, or from the second point to the first", None
     )
     stiffness: float = quantity("N/m", "spring", default=0.0, zero=True)
@@ -77,27 +79,27 @@ class SpringTable(Entry):
     frame: str | None = Field(None, description=FRAME)
 
 
-class MountTable(Entry):
+class MountTable(NamedTable):
     """[[mounts]]: three springs and dampers along x, y, z at one place; outputs call them NAME.x, NAME.y, NAME.z."""
 
     bodies: Names = Field(description='two bodies; the second may be "ground"')
-    point: Triple = quantity_list("m", "its place")
-    stiffness: NotNegativeTriple = quantity_list("N/m", "along x, y, z")
-    damping: NotNegativeTriple = quantity_list("N s/m", "along x, y, z", [0.0, 0.0, 0.0])
+    point: ThreeNumbers = quantity_list("m", "its place")
+    stiffness: ThreeNotNegative = quantity_list("N/m", "along x, y, z")
+    damping: ThreeNotNegative = quantity_list("N s/m", "along x, y, z", [0.0, 0.0, 0.0])
     frame: str | None = Field(None, description=FRAME)
 
 
-class SeatTable(Entry):
+class SeatTable(NamedTable):
     """[[seats]]: an occupant that moves up and down on a spring and damper; both the body and its spring are NAME."""
 
     body: str = Field(description="body that carries the seat")
     mass: float = quantity("kg", "mass of the occupant")
-    position: Triple = quantity_list("m", "the occupant, and the foot of the seat under it")
+    position: ThreeNumbers = quantity_list("m", "the occupant, and the foot of the seat under it")
     stiffness: float = quantity("N/m", "spring")
     damping: float = quantity("N s/m", "damper", zero=True)
 
 
-class BarTable(Entry):
+class BarTable(NamedTable):
     """[[anti_roll_bars]]: moment stiffness (roll of body - (left - right height) / their distance)."""
 
     body: str = Field(description="body whose roll it resists")
@@ -106,14 +108,14 @@ class BarTable(Entry):
     damping: float = quantity("N m s/rad", "torsional damping", default=0.0, zero=True)
 
 
-class AxleTable(Entry):
+class AxleTable(NamedTable):
     """[[axles]]: an axle of the vehicle, listed from the front."""
 
     x: float = quantity("m", "place of the axle", signed=True)
     roll_steer: float = quantity("rad/rad", "steer of its wheels over roll of the chassis", default=0.0, signed=True)
 
 
-class TyreTable(Entry):
+class TyreTable(NamedTable):
     """[[tyres]]: vertical spring and damper to the road at the axle's x."""
 
     axle: str = Field(description="name of its axle")
@@ -129,10 +131,10 @@ class DragTable(Strict):
 
     body: str
     coefficient: float = quantity("N s^2/m^2", "force over speed and velocity")
-    source: str = _source()
+    source: str = _source_field()
 
 
-Kind = Literal[
+OutputKind = Literal[
     "acceleration",
     "velocity",
     "displacement",
@@ -152,10 +154,10 @@ class OutputTable(Strict):
     bar, or of a tyre."""
 
     name: Name
-    kind: Kind
+    kind: OutputKind
     body: str | None = Field(None, description="body, for accelerations and other motion")
-    point: Triple | None = quantity_list("m", "point of the body, its centre of mass where nothing is said", None)
-    direction: Triple = quantity_list("", "direction or axis", UP)
+    point: ThreeNumbers | None = quantity_list("m", "point of the body, its centre of mass where nothing is said", None)
+    direction: ThreeNumbers = quantity_list("", "direction or axis", UP)
     part: str | None = Field(None, description="spring, mount (NAME.z), seat or bar, for travel, travel rate, force")
     tyre: str | None = Field(None, description="tyre, for tyre force and deflection")
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from models.core.discretisation import errors_of
+from models.core.discretisation import error_estimates_of
 from models.core.errors import InputError, suggestion_phrase
-from models.core.result import Result, load
+from models.core.result import Result, load_result
 from models.core.whole_files import whole_file
 from models.measured.channel import FileChannel, MeasurementSource
 from models.measured.file_kinds import is_measurement
@@ -258,7 +258,7 @@ def _compared_channel(
     if not is_within.any():
         return None
     read = CubicSpline(channel_pair.run_times, channel_pair.run_values)(times[is_within])
-    stated = errors_of(saved_run).get(channel_name.partition(", ")[0])
+    stated = error_estimates_of(saved_run).get(channel_name.partition(", ")[0])
     return ChannelComparison(
         channel_name,
         channel_unit,
@@ -276,7 +276,7 @@ def saved_results(result_path: Path) -> dict[str, Result]:
     files = [result_path] if result_path.is_file() else sorted(result_path.rglob("*.nc"))
     if not files:
         raise InputError(result_path, "", None, "holds no saved result (.nc): name the folder of a run")
-    return {file.stem: load(file) for file in files}
+    return {file.stem: load_result(file) for file in files}
 
 
 def report(

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from models.core.discretisation import errors_of
+from models.core.discretisation import error_estimates_of
 from models.core.errors import InputError
-from models.core.result import Result, load
+from models.core.result import Result, load_result
 from models.core.told import DOUBT_ATTRIBUTES, Results
 from models.core.whole_files import whole_file
 from studies.command.differences import QuantityDifference, ResultQuantity
@@ -119,7 +119,7 @@ def _result_files(results_folder: Path) -> dict[str, Path]:
 def _holds_same_table(result_path: Path) -> bool:
     """Whether the CSV file of the same name as a netCDF file holds the same table: all channels have one common
     axis."""
-    return result_path.with_suffix(".csv").exists() and len(load(result_path).data.sizes) < 2
+    return result_path.with_suffix(".csv").exists() and len(load_result(result_path).data.sizes) < 2
 
 
 def results_of(first_path: Path, second_path: Path) -> dict[str, Result]:
@@ -137,14 +137,16 @@ def results_of(first_path: Path, second_path: Path) -> dict[str, Result]:
 def _result_of_file(result_path: Path) -> Result | None:
     """The saved result of a netCDF file, or of the netCDF file beside a CSV table; None if there is none."""
     netcdf_path = result_path.with_suffix(".nc")
-    return load(netcdf_path) if netcdf_path.is_file() else None
+    return load_result(netcdf_path) if netcdf_path.is_file() else None
 
 
 def _quantities_of_file(result_path: Path) -> Iterator[tuple[str, ResultQuantity]]:
     """Yield name and values of each quantity of a file, with the error that its result states."""
     yield from _with_stated_errors(
         _result_of_file(result_path),
-        channels_of(load(result_path).data) if result_path.suffix == ".nc" else _quantities_of_table(result_path),
+        channels_of(load_result(result_path).data)
+        if result_path.suffix == ".nc"
+        else _quantities_of_table(result_path),
     )
 
 
@@ -153,7 +155,7 @@ def _with_stated_errors(
 ) -> Iterator[tuple[str, ResultQuantity]]:
     """Yield name and values of each quantity of a result, with the error that the result states for the channel, if
     any."""
-    errors = {} if saved_run is None else errors_of(saved_run)
+    errors = {} if saved_run is None else error_estimates_of(saved_run)
     for name, quantity in quantities:
         stated = errors.get(name.partition(", ")[0])
         yield name, quantity if stated is None else replace(quantity, stated_error=stated.error)

@@ -8,10 +8,10 @@ from typing import Any
 from models.core.errors import InputError
 from models.core.systems import SYSTEMS
 from models.core.whole_files import write_whole
-from models.engines.export import SUFFIXES, Exported
+from models.engines.export import SUFFIXES, ExportedModel
 
 
-def exported_vehicle(scene: Any, engine: str) -> Exported:
+def exported_vehicle(scene: Any, engine: str) -> ExportedModel:
     """Export of a scene's vehicle: text of the file, and lists of its contents and omissions. Raises InputError for an
     engine without a file format and for a system without an exportable vehicle."""
     if engine not in SUFFIXES:
@@ -19,7 +19,7 @@ def exported_vehicle(scene: Any, engine: str) -> Exported:
     if scene.system not in _exportable_systems():
         allowed = "has no vehicle that an engine builds"
         raise InputError(scene.file, "system", scene.system, allowed, _exportable_systems())
-    answer: Exported = import_module(f"{SYSTEMS[scene.system].package}.export").exported(scene, engine)
+    answer: ExportedModel = import_module(f"{SYSTEMS[scene.system].package}.export").exported(scene, engine)
     return answer
 
 

@@ -3,7 +3,7 @@
 from importlib import import_module
 
 from models.core.scene_effects import effect_sentences
-from models.core.scene_file import parse
+from models.core.scene_file import parse_toml
 from models.core.systems import DEFAULT_SYSTEM, SYSTEMS
 from models.engines.catalogue import CATALOGUE
 from models.systems.pitch_plane.scene import parameter_sets
@@ -12,7 +12,7 @@ from studies.command.asked import SCENES_FOLDER
 
 def print_lists() -> None:
     """Print the lists of scenes, effects, parameter sets and engines, each with its title."""
-    scenes = {path.stem: parse(path)["title"] for path in sorted(SCENES_FOLDER.glob("*.toml"))}
+    scenes = {path.stem: parse_toml(path)["title"] for path in sorted(SCENES_FOLDER.glob("*.toml"))}
     sets = {name: import_module(f"models.vehicles.parameters.{name}").SOURCE for name in parameter_sets()}
     _print_titled_list("scenes (twinrig run NAME, or a file of your own)", scenes)
     for system in SYSTEMS:

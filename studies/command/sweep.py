@@ -23,7 +23,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from models.core import told
-from models.core.assumptions import broken_of
+from models.core.assumptions import broken_assumptions_of
 from models.core.discretisation import largest_estimate
 from models.core.errors import InputError, RunFailed
 from models.core.scene_file import changed_tables
@@ -370,7 +370,7 @@ def _largest_error(point_results: told.Results) -> float | None:
 
 def _broken_assumption_text(point_results: told.Results) -> str:
     """Text on assumptions that a point's results broke, each with the share of time for which it was broken."""
-    breaches = [(name, breach) for name, run in point_results.items() for breach in broken_of(run)]
+    breaches = [(name, breach) for name, run in point_results.items() for breach in broken_assumptions_of(run)]
     return "; ".join(f"{name}: {breach.name} ({100.0 * breach.share:.2g} %)" for name, breach in breaches)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.assumptions import broken_of
+from models.core.assumptions import broken_assumptions_of
 from models.core.discretisation import WARNED_SHARE, largest_estimate
 from models.core.told import Results
 from models.drawing.figures import (
@@ -68,7 +68,7 @@ class SweepResults:
         return [
             i
             for i, results in enumerate(self.results_of_points)
-            if any(map(broken_of, _results_of_engine(results, engine).values()))
+            if any(map(broken_assumptions_of, _results_of_engine(results, engine).values()))
         ]
 
     def warned_points(self, engine: str) -> list[int]:

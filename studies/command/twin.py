@@ -16,9 +16,9 @@ from models.own_model.certificate import (
     softness_difference,
 )
 from models.own_model.control_table import ControlTable, read_controls
-from models.own_model.elements import Element, two_digit_text
-from models.own_model.explain import Comparison, Difference, compare, removals_that_agree
-from models.own_model.file import ModelFile, read
+from models.own_model.elements import ModelProperty, two_digit_text
+from models.own_model.explain import ModelComparison, PropertyDifference, compare_models, removals_that_agree
+from models.own_model.file import ModelFile, read_model_file
 from models.own_model.limits import limits_struck
 from models.own_model.names import first_names_text
 from models.own_model.path import PathReport, compare_paths, step_count_of_path
@@ -60,7 +60,7 @@ class ExaminedFile:
 
     file: ModelFile
     agreements: tuple[Agreement, ...]
-    explanations: dict[str, list[tuple[Element, float]]]
+    explanations: dict[str, list[tuple[ModelProperty, float]]]
     misread_numbers: tuple[MisreadNumber, ...]
     path_report: PathReport | None
     price_lines: tuple[str, ...] = ()
@@ -83,7 +83,7 @@ class TwinResults:
     their runs in time, None if not requested or if the files have different coordinates."""
 
     examined: tuple[ExaminedFile, ...]
-    comparison: Comparison | None
+    comparison: ModelComparison | None
     path_gap: PathGap | None = None
 
     @property
@@ -139,7 +139,7 @@ def examine(
     ):
         allowed = "acts on paths of one file alone: leave out --no-paths, --tolerance and other files"
         raise InputError("--controls", "", str(twin_options.controls_path), allowed)
-    read_files = [read(path, omitted_kinds, twin_options.resource_folder) for path in model_paths]
+    read_files = [read_model_file(path, omitted_kinds, twin_options.resource_folder) for path in model_paths]
     for file in read_files if twin_options.compare_paths else ():
         step_count_of_path(file.twin)
     tables = [
@@ -158,7 +158,7 @@ def examine(
     names = [examined_file.name for examined_file in examined]
     if names[0] == names[1]:
         names = [str(path) for path in model_paths]
-    comparison = compare(replace(first, name=names[0]), replace(second, name=names[1]))
+    comparison = compare_models(replace(first, name=names[0]), replace(second, name=names[1]))
     gap = (
         compare_two_paths(first, second)
         if twin_options.compare_paths and comparison.acceleration_agreement is not None
@@ -322,12 +322,12 @@ def _file_lines(examined_file: ExaminedFile) -> list[str]:
     return rows + [f"  {line}".rstrip() for line in examined_file.price_lines]
 
 
-def _at_which_controls(element_difference: Difference) -> str:
+def _at_which_controls(element_difference: PropertyDifference) -> str:
     """Phrase on the controls at which an actuator's difference has no influence; "" for all other elements."""
     return " at controls of 0, or the nearest in range" if element_difference.owner.startswith("actuator ") else ""
 
 
-def _comparison_lines(model_comparison: Comparison, model_names: Sequence[str]) -> list[str]:
+def _comparison_lines(model_comparison: ModelComparison, model_names: Sequence[str]) -> list[str]:
     if model_comparison.acceleration_agreement is None:
         rows = [
             "the files have not the same coordinates:",

@@ -13,7 +13,7 @@ from models.ride.road_path import RoadPath, road_path
 from models.systems.ride.of_scene import GRAVITY, excitation_of, vehicle_of
 from models.systems.ride.scene import build as ride_scene
 from models.vehicles.spatial import PointOutput, SpatialVehicle, TyreOutput
-from models.vehicles.spatial_linear import linearise, preloads, wheels
+from models.vehicles.spatial_linear import linearise, static_preloads, wheels
 from studies.pictures.camera import Camera
 from studies.pictures.film import (
     ArrowStyle,
@@ -116,7 +116,7 @@ def force_arrows(
         + road_heights @ np.concatenate([output.road_factors, output.road_rate_factors])
         for output in linearise(vehicle, SPEED).outputs
     ]
-    static_forces, names = preloads(replace(vehicle, gravity=GRAVITY)).tyres, vehicle.coordinates()
+    static_forces, names = static_preloads(replace(vehicle, gravity=GRAVITY)).tyres, vehicle.coordinates()
     arrows = [
         _road_force_arrow("wheel load", vehicle, tyre, static_forces[tyre.name] + force, 2, body_poses)
         for tyre, force in zip(vehicle.tyres, forces, strict=False)

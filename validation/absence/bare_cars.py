@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from models.engines.assembly import Settings
-from models.engines.protocol import guard
+from models.engines.protocol import check_trajectory
 from models.machine.timing import interleave, paired_ratio
 from models.multibody.numbers import Handling
 from models.systems.handling.run import build_in_engine
@@ -44,7 +44,7 @@ def car_runs(step_count: int) -> tuple[Job, Job]:
 
     def run_hand_built() -> tuple[np.ndarray, ...]:
         states = by_hand()
-        guard("mujoco", state_times, states, step_count * STEP)
+        check_trajectory("mujoco", state_times, states, step_count * STEP)
         return tuple(np.split(states, 2, axis=1))
 
     return run_twinrig, run_hand_built

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.engines.assembly import Settings
-from models.engines.protocol import guard
+from models.engines.protocol import check_trajectory
 from models.engines.spatial_protocol import INTEGRATORS, build
 from models.machine.timing import interleave, paired_ratio
 from models.ride.copies_kernel import POWERS_SUMMED, march_copies
@@ -55,7 +55,7 @@ def ride_runs(engine: str, step_count: int) -> tuple[Job, Job]:
 
     def run_hand_built() -> np.ndarray:
         states = by_hand()
-        guard(engine, road.step * np.arange(step_count + 1), states, duration)
+        check_trajectory(engine, road.step * np.arange(step_count + 1), states, duration)
         return states
 
     return run_twinrig, run_hand_built

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 Run = Callable[[], np.ndarray]
 """Function that simulates from the start state; returns the states (step_count + 1, 8)."""
 
 
-def exudyn_run(parameters: Parameters, start_state: np.ndarray, step: float, step_count: int) -> Run:
+def exudyn_run(parameters: PitchPlaneParameters, start_state: np.ndarray, step: float, step_count: int) -> Run:
     """Returns a function that simulates the pitch-plane vehicle in Exudyn by the classical Runge-Kutta method; step in
     s. Exudyn's x axis in the plane points backward."""
     import exudyn as exu
@@ -110,7 +110,7 @@ def exudyn_march(
     return march
 
 
-def mujoco_model(parameters: Parameters, step: float) -> Any:
+def mujoco_model(parameters: PitchPlaneParameters, step: float) -> Any:
     """The pitch-plane vehicle in MuJoCo, from hand-written XML; z points down, positive pitch lifts the front."""
     import mujoco
 
@@ -119,7 +119,7 @@ def mujoco_model(parameters: Parameters, step: float) -> Any:
     )
 
 
-def mujoco_run(parameters: Parameters, start_state: np.ndarray, step: float, step_count: int) -> Run:
+def mujoco_run(parameters: PitchPlaneParameters, start_state: np.ndarray, step: float, step_count: int) -> Run:
     """Returns a function that simulates the pitch-plane vehicle in MuJoCo by the classical Runge-Kutta method; step in
     s."""
     import mujoco

@@ -17,13 +17,13 @@ from mujoco import rollout
 from models.contact.fastsim_many import fill_contact_forces_in_place
 from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, MarchWorkspace, cells_in, strips_in
 from models.engines.mujoco_callback import kernel_law
-from models.engines.mujoco_quiet import installed
+from models.engines.mujoco_quiet import installed_callback
 from models.engines.mujoco_tree import principal_inertias
 from models.machine.compiled import lean
-from models.machine.records import records, size_of, stacked
+from models.machine.records import records_at_pointer, size_of, stack_records
 from models.machine.stack import array, beyond, doubles, row
 from models.multibody.numbers import Handling
-from models.multibody.tree import cross, dot, plus, three, times
+from models.multibody.tree import cross, dot, plus, three_from, times
 from models.tyre.bristles import SECOND_ORDER_MARCH, THREE_BRISTLES, cornering_stiffness_factor, patch_grid
 from models.vehicles.free_vehicle import ROTOR_MASS
 
@@ -57,7 +57,7 @@ def add_car_forces(parameter_table, t, q, v, forces_out):
     turning = v[4], c_roll * v[5], s_roll * v[5]
     frame, speed_forward, speed_leftward = (x, y, z, turning), c_yaw * v[0] + s_yaw * v[1], c_yaw * v[1] - s_yaw * v[0]
     passing = speed_forward, speed_leftward, head[0]
-    contacts, forces = doubles(4 * CONTACT_NUMBERS), stacked(4, FORCES)
+    contacts, forces = doubles(4 * CONTACT_NUMBERS), stack_records(4, FORCES)
     wheel_positions, pushes = doubles(12), doubles(12)
     left = wheel_positions, pushes, contacts
     moment = plus(
@@ -69,12 +69,12 @@ def add_car_forces(parameter_table, t, q, v, forces_out):
     _add_bar_forces((head[6], head[7], head[8]), 0, left, q, forces_out)
     _add_bar_forces((head[9], head[10], head[11]), 2, left, q, forces_out)
     fill_contact_forces_in_place(
-        records(contacts, 4, CONTACT),
+        records_at_pointer(contacts, 4, CONTACT),
         strips_in(array(beyond(cells, 5 * CELLS), (4, int(head[12])))),
         cells_in(array(cells, (5, CELLS)), head[13]),
         THREE_BRISTLES,
         SECOND_ORDER_MARCH,
-        MarchWorkspace(stacked(4, SLIP), stacked(1, BLOCK)),
+        MarchWorkspace(stack_records(4, SLIP), stack_records(1, BLOCK)),
         forces,
     )
     force_along, across, turn, lift = 0.0, 0.0, 0.0, 0.0
@@ -85,7 +85,7 @@ def add_car_forces(parameter_table, t, q, v, forces_out):
         forces_out[k + 1] += dot(z, force)
         forces_out[k + 2] -= radius * creep.fx
         moment = plus(
-            moment, plus(cross(three(wheel_position, 0), force), (radius * creep.fy, -radius * creep.fx, creep.mz))
+            moment, plus(cross(three_from(wheel_position, 0), force), (radius * creep.fy, -radius * creep.fx, creep.mz))
         )
         force_along, across, lift = (
             force_along + creep.fx,
@@ -137,7 +137,7 @@ def _wheel_forces(wheel_parameters, chassis_frame, chassis_velocities, q, v, whe
         bush * wheel_parameters[3] - strut * wheel_parameters[4],
     )
     wheel_position[0], wheel_position[1], wheel_position[2] = plus(arm, displacement)
-    u, radius = plus(sliding, cross(turning, three(wheel_position, 0))), q[3] + wheel_position[2]
+    u, radius = plus(sliding, cross(turning, three_from(wheel_position, 0))), q[3] + wheel_position[2]
     load, tread = (
         max(wheel_parameters[11] - wheel_parameters[12] * (radius - wheel_parameters[13]), 0.0),
         radius * v[k + 2],
@@ -329,7 +329,7 @@ def run(
     data, state, callback = mujoco.MjData(built), np.concatenate(([0.0], q, v)), kernel_law(add_car_forces)
 
     def run_car() -> np.ndarray:
-        with installed(callback):
+        with installed_callback(callback):
             path, _ = rollout.rollout(built, data, state[None, :], nstep=step_count)
         return np.vstack([state[1:], path[0, :, 1 : 1 + 2 * COORDINATE_COUNT]])
 

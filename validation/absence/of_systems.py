@@ -19,7 +19,7 @@ from typing import Any
 from unittest import mock
 
 from models.core.errors import Refused
-from models.core.scene_effects import module_of, names_of, with_effects
+from models.core.scene_effects import effect_names_of, effect_of, with_effects
 from models.core.systems import SYSTEMS, modules_of
 from validation.absence.probes import registered_callbacks
 from validation.common.rows import Observed, Row, System, behaviour_row
@@ -76,7 +76,7 @@ def counts_and_paths(system_name: str, scene: Any, is_quick: bool = False) -> di
 def addable_effects(system_name: str) -> tuple[str, ...]:
     """Names of the effects that can be added to a system's bare scene, with usual values or with hand-written
     tables."""
-    modules = {name: module_of(system_name, name) for name in names_of(system_name)}
+    modules = {name: effect_of(system_name, name) for name in effect_names_of(system_name)}
     return tuple(
         name
         for name, module in modules.items()
@@ -94,13 +94,13 @@ def scenes_with_and_without(system_name: str, effect_name: str) -> tuple[Any, An
             bare_scene(system_name, **tables) for tables in hand_written_tables(system_name)[effect_name]
         )
         return scene_without, scene_with
-    needs = module_of(system_name, effect_name).NEEDS
+    needs = effect_of(system_name, effect_name).NEEDS
     return with_effects(bare_scene(system_name), *needs), with_effects(bare_scene(system_name), *needs, effect_name)
 
 
 def declared_counts(system_name: str, effect_name: str, engine_names: Iterable[str]) -> Counts:
     """Counts of components that an effect adds to a model in each engine, as its file declares them."""
-    counts = module_of(system_name, effect_name).COUNTS
+    counts = effect_of(system_name, effect_name).COUNTS
     return {engine: {**counts.get("all", {}), **counts.get(engine, {})} for engine in engine_names}
 
 
@@ -124,7 +124,7 @@ def _counts_without_effect(system_name: str, effect_name: str, is_quick: bool) -
         return _counts_with_tables(
             system_name, (), json.dumps(hand_written_tables(system_name)[effect_name][0]), is_quick
         )
-    return _counts_with_tables(system_name, module_of(system_name, effect_name).NEEDS, "{}", is_quick)
+    return _counts_with_tables(system_name, effect_of(system_name, effect_name).NEEDS, "{}", is_quick)
 
 
 @cache
@@ -157,7 +157,7 @@ def absence_facts(system_names: tuple[str, ...] = tuple(BARE_SCENE_FILES)) -> di
 
 
 def _modules_of_effects(system_name: str) -> dict[str, tuple[str, ...]]:
-    return {name: module_of(system_name, name).MODULES for name in names_of(system_name)}
+    return {name: effect_of(system_name, name).MODULES for name in effect_names_of(system_name)}
 
 
 def _effect_facts(
@@ -189,7 +189,7 @@ def _without_modules(system_name: str, module_names: list[str]) -> Iterator[None
     sys.modules.update(blocked)
     package = import_module(SYSTEMS[system_name].effects)
     with mock.patch.object(package, "__path__", []), mock.patch.object(package, "TABLE", {}, create=True):
-        assert not names_of(system_name)
+        assert not effect_names_of(system_name)
         yield
     for name in module_names:
         del sys.modules[name]

@@ -109,8 +109,8 @@ def _probes_around_march(engine: str, march_counts: MarchCounts) -> Iterator[Non
     if engine == "reference":
         from models.engines import reference
 
-        real = reference.march_of
-        patch = mock.patch.object(reference, "march_of", lambda *key: _with_probes(real(*key), march_counts))
+        real = reference.compiled_march
+        patch = mock.patch.object(reference, "compiled_march", lambda *key: _with_probes(real(*key), march_counts))
     elif engine == "mujoco":
         from mujoco import rollout
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from models.core.errors import InputError, Refused
 from models.engines.assembly import Settings
-from models.engines.free_vehicle import Driven, free_model
-from models.vehicles.free_vehicle import joints
+from models.engines.free_vehicle import LoadedVehicle, free_model
+from models.vehicles.free_vehicle import joint_table
 from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle, Vector
 from validation.adams_joints.mechanism import Mechanism
 from validation.adams_joints.motion import BodyMotion, Reaction, reaction_by_momentum
@@ -69,7 +69,7 @@ class JointTree:
         )
         return SpatialVehicle("mechanism", (*joint_bodies, body), (), (), ())
 
-    def vehicle_with_springs(self) -> Driven:
+    def vehicle_with_springs(self) -> LoadedVehicle:
         """The vehicle description for the engines, with the springs as compiled forces."""
         vehicle = self.vehicle()
         springs = [
@@ -81,7 +81,7 @@ class JointTree:
             for spring in self.mechanism.springs
         ]
         gravity = self.to_vehicle_axes(self.mechanism.gravity)
-        return Driven(vehicle, gravity, spring_table(vehicle, springs), spring_forces, set_spring_forces)
+        return LoadedVehicle(vehicle, gravity, spring_table(vehicle, springs), spring_forces, set_spring_forces)
 
     def motion(self, times: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> BodyMotion:
         """Motion of the body in the axes of the ground, from coordinates q, rates v and accelerations a (m, n) of the
@@ -184,7 +184,7 @@ def _motion_of_last_body(
     count = len(q)
     x, w, alpha = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
     speed, gain, rotation = np.zeros((count, 3)), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1))
-    kinds, origin = joints(vehicle), np.zeros(3)
+    kinds, origin = joint_table(vehicle), np.zeros(3)
     kinds_and_arms = [(int(kind), tuple(arm)) for kind, _, *arm in kinds]
     for j, (kind, arm) in enumerate(kinds_and_arms):
         origin = origin + arm

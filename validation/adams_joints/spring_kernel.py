@@ -10,9 +10,17 @@ import numpy as np
 
 from models.machine.compiled import compiled
 from models.machine.stack import array, at, beyond, doubles
-from models.multibody.cut_mechanics import PER_JOINT, PER_MOTION, ROTATES, add_wrench, joint_velocity, locate, move
-from models.multibody.tree import dot, plus, three, times
-from models.vehicles.free_vehicle import joints, last_coordinate_and_joint
+from models.multibody.cut_mechanics import (
+    PER_JOINT,
+    PER_MOTION,
+    ROTATES,
+    add_wrench,
+    joint_velocity,
+    move_bodies,
+    point_position,
+)
+from models.multibody.tree import dot, plus, three_from, times
+from models.vehicles.free_vehicle import joint_table, last_coordinate_and_joint
 from models.vehicles.spatial import FREEDOMS, SpatialVehicle
 from validation.adams_joints.mechanism import Spring
 
@@ -27,7 +35,7 @@ _NONE = (0.0, 0.0, 0.0)
 def spring_table(vehicle: SpatialVehicle, springs: list[Spring]) -> np.ndarray:
     """Parameters of the springs and of the chain of joints as one array for ``spring_forces``. The springs' points are
     in the vehicle's axes; a torsion spring acts on the last coordinate."""
-    chain = joints(vehicle)
+    chain = joint_table(vehicle)
     kinds = chain[:, 0].astype(int)
     rows = np.column_stack([chain[:, 1], kinds >= FREEDOMS.index("rx"), kinds % 3, chain[:, 2:]])
     last_body, origin = last_coordinate_and_joint(vehicle, vehicle.bodies[-1].name)
@@ -56,15 +64,15 @@ def spring_forces(parameter_table, t, q, v, force_sum):
     springs = array(beyond(parameter_table, HEAD_NUMBERS + n * PER_JOINT), (count, NUMBERS_PER_SPRING))
     joint_positions, rate, force_view = array(q, (n,)), array(v, (n,)), array(force_sum, (n,))
     m = array(doubles((n + 1) * PER_MOTION), (n + 1, PER_MOTION))
-    move(chain, joint_positions, rate, m)
+    move_bodies(chain, joint_positions, rate, m)
     for i in range(count):
         law = springs[i]
         j = int(law[COORDINATE])
         if j >= 0:
             force_view[j] -= law[STIFFNESS] * (joint_positions[j] - law[FREE_LENGTH]) + law[DAMPING] * rate[j]
             continue
-        tip = locate(m[n], springs[i], ARM)
-        offset = plus(tip, times(three(law, GROUND), -1.0))
+        tip = point_position(m[n], springs[i], ARM)
+        offset = plus(tip, times(three_from(law, GROUND), -1.0))
         length = math.sqrt(dot(offset, offset))
         if length == 0.0:  # no line, hence no force along it
             continue

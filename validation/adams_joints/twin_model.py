@@ -12,7 +12,7 @@ import numpy as np
 from models.core.errors import Refused
 from models.engines.free_vehicle import free_model
 from models.own_model.certificate import certificate
-from models.own_model.file import read
+from models.own_model.file import read_model_file
 from models.own_model.path import file_path
 from models.own_model.reading import TwinModel
 from validation.adams_joints.mechanism import Mechanism, Spring
@@ -88,7 +88,7 @@ def build_differences(
     """
     path = work_folder / "joint.xml"
     path.write_text(as_mjcf(mechanism), encoding="utf-8")
-    twin = read(path).twin
+    twin = read_model_file(path).twin
     worst = max(row.acceleration for row in certificate(twin, STATE_COUNT))
     start = np.zeros(twin.size), _start_rates(mechanism, twin)
     n, built = twin.size, free_model("exudyn", twin.driven).march(*start, step_count, time_step)

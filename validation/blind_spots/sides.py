@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, of_table
+from models.core.systems import DEFAULT_SYSTEM, SYSTEMS, scene_of_table
 from validation.blind_spots.rewriting import ROOT
 
 SCENE_FOLDERS = tuple(ROOT / "validation" / name / "scenes" for name in ("replay", "blind_spots"))
@@ -46,7 +46,7 @@ def prepared_scene(scene_path: str) -> Any:
     path = scene_files()[scene_path]
     table = tomllib.loads(path.read_text(encoding="utf-8"))
     table.pop("engines_asked", None)  # the key of a recorded job
-    return of_table(table, scene_path, path.parent)
+    return scene_of_table(table, scene_path, path.parent)
 
 
 def engines_of_functions(run_traces: Iterable[Mapping[str, Any]]) -> dict[str, tuple[str, ...]]:

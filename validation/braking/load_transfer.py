@@ -9,7 +9,7 @@ to first order, whatever springs do: contacts go with their wheels, spins slow d
 
 import numpy as np
 
-from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
+from models.multibody.numbers import GRAVITY, Controls, Handling, TyreParameters
 from models.systems.handling.run import SimulatedDrive
 from models.vehicles.free_vehicle import SWAY
 from models.vehicles.spatial import SpatialVehicle
@@ -17,7 +17,9 @@ from models.vehicles.spatial import SpatialVehicle
 
 def sliding_car(vehicle: SpatialVehicle, friction_coefficient: float) -> Handling:
     """The vehicle with all wheels locked, which slide with constant friction mu and so brake at mu g."""
-    return Handling(vehicle, Tyres(friction=friction_coefficient, fixed=tuple(tyre.name for tyre in vehicle.tyres)))
+    return Handling(
+        vehicle, TyreParameters(friction=friction_coefficient, fixed=tuple(tyre.name for tyre in vehicle.tyres))
+    )
 
 
 def turning_car(vehicle: SpatialVehicle, steer: float) -> Handling:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.scene_effects import module_of, names_of, scene_without
+from models.core.scene_effects import effect_names_of, effect_of, scene_without
 from models.core.systems import DEFAULT_SYSTEM
 from models.core.time_series import write_time_series
 from models.engines.model import Model
@@ -42,14 +42,14 @@ PRESCRIBED_PITCH_SETTINGS = {"integrator": "GeneralizedAlpha"}
 """Exudyn settings for a scene with a prescribed pitch: only this integrator solves for the prescribed pitch. The scene
 without the effect uses the same settings."""
 
-EFFECT_NAMES = names_of(DEFAULT_SYSTEM)
+EFFECT_NAMES = effect_names_of(DEFAULT_SYSTEM)
 """Names of all effects of the pitch-plane vehicle."""
 
 
 def required_effects(effect_name: str) -> dict[str, Any]:
     """Scene tables of the effects without which an effect cannot be used."""
-    module = module_of(DEFAULT_SYSTEM, effect_name)
-    return {name: module_of(DEFAULT_SYSTEM, name).EXAMPLE for name in module.NEEDS} | module.BESIDE
+    module = effect_of(DEFAULT_SYSTEM, effect_name)
+    return {name: effect_of(DEFAULT_SYSTEM, name).EXAMPLE for name in module.NEEDS} | module.BESIDE
 
 
 def scene_with_effects(
@@ -95,7 +95,7 @@ def scenes_without_and_with_effect(effect_name: str, step_count: int, work_folde
     needed, prescribed, module = (
         required_effects(effect_name),
         effect_name.startswith("prescribed"),
-        module_of(DEFAULT_SYSTEM, effect_name),
+        effect_of(DEFAULT_SYSTEM, effect_name),
     )
     scene_below = scene_with_effects(needed, step_count, work_folder, prescribed)
     if hasattr(module, "leave_out"):  # the vehicle has it unless the scene says otherwise
@@ -124,7 +124,7 @@ def component_count_changes(effect_name: str, engine_name: str, work_folder: Pat
 def declared_count_changes(effect_name: str, engine_name: str) -> dict[str, int]:
     """Changes of the numbers of components in an engine's model that an effect declares in its COUNTS; zero changes are
     left out."""
-    table = module_of(DEFAULT_SYSTEM, effect_name).COUNTS
+    table = effect_of(DEFAULT_SYSTEM, effect_name).COUNTS
     return {key: value for key, value in {**table.get("all", {}), **table.get(engine_name, {})}.items() if value}
 
 

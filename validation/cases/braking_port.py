@@ -21,7 +21,7 @@ from models.brake.controller import SAMPLING_PERIOD, Controller, Sample
 from models.brake.port.ask import ControllerFailed, checked_command
 from models.brake.port.example import Example
 from models.brake.port.setup import ControllerRunData, PortTable, controller_of_run
-from models.machine.timing import median
+from models.machine.timing import bootstrap_median
 from models.systems.braking.march import BrakingPath
 from models.systems.braking.run import run
 from models.systems.braking.scene import build
@@ -206,7 +206,9 @@ def _exchange_times(
         for i in range(round_count):
             for name, controller in controllers.items():
                 seconds.setdefault(name, []).append(_seconds_of_exchange_round(controller, i * EXCHANGES_PER_ROUND))
-    return {name: list(median(1e6 * np.array(values) / EXCHANGES_PER_ROUND)) for name, values in seconds.items()}
+    return {
+        name: list(bootstrap_median(1e6 * np.array(values) / EXCHANGES_PER_ROUND)) for name, values in seconds.items()
+    }
 
 
 def _seconds_of_exchange_round(controller: Controller, first_sample_number: int) -> float:

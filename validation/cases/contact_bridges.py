@@ -17,14 +17,14 @@ from models.contact.inputs import Array
 from models.contact.patches import separate_patches
 from models.contact.simplified_theory import solve_normal_contact, solve_rolling_contact
 from models.engines.contact_bridge import FREEDOM, FREEDOMS, Theory, Wheels, add_forces, forces
-from models.engines.contact_bridge_exudyn import ROUTES, Forces, Rolling
-from models.engines.contact_bridge_mujoco import empty_law, model, python_law
+from models.engines.contact_bridge_exudyn import ROUTES, RailWheelSystem, WheelForceFunctions
+from models.engines.contact_bridge_mujoco import empty_law, python_law, rail_wheel_model
 from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_march import Marcher
-from models.engines.mujoco_quiet import installed
+from models.engines.mujoco_quiet import installed_callback
 from models.machine.compiled import njit
 from models.machine.stack import start
-from models.machine.timing import interleave, median, spelled
+from models.machine.timing import bootstrap_median, interleave, interval_text
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
 from validation.contact import slow_wheels
 
@@ -95,10 +95,10 @@ class ContactTimingSetup:
         """The same set-up without contact."""
         return replace(self, bridge="none", contact_law=None)
 
-    def wheels(self) -> Wheels:
+    def wheels(self) -> RailWheels:
         """The wheels that this set-up simulates."""
         theory, cells = self.contact_law or ("none", 21)
-        return Wheels(self.wheel_count, cast(Theory, theory), cells or 21)
+        return RailWheels(self.wheel_count, cast(Theory, theory), cells or 21)
 
 
 def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -184,7 +184,7 @@ class MeasuredContactTimes:
         """Median time (s) of a step, its parts for engine, kernel and bridge, and the bridge's share of the step."""
         a, b, c = self.times_by_round(timing_setup)
         step, bare, kernel = (float(np.median(round_times)) for round_times in (a, b, c))
-        share = median((a - b - c) / a)
+        share = bootstrap_median((a - b - c) / a)
         return {
             "engine": timing_setup.engine,
             "method": timing_setup.integrator,
@@ -197,7 +197,7 @@ class MeasuredContactTimes:
             "kernel": kernel,
             "over": step - bare - kernel,
             "share": share,
-            "range": median(a)[1:],
+            "range": bootstrap_median(a)[1:],
         }
 
 
@@ -226,9 +226,12 @@ def _timed_march(timing_setup: ContactTimingSetup) -> tuple[Callable[[int], Any]
     return march, max(2, STEP_COUNT_BY_BRIDGE[kind] // FORCE_CALLS_PER_STEP[timing_setup.integrator])
 
 
-def _mujoco_march(timing_setup: ContactTimingSetup, wheels: Wheels, contact_law: Any) -> Callable[[int], Any]:
+def _mujoco_march(timing_setup: ContactTimingSetup, wheels: RailWheels, contact_law: Any) -> Callable[[int], Any]:
     """Function that simulates a given number of steps in MuJoCo."""
-    start, march = np.concatenate(wheels.state())[None], Marcher(model(wheels, TIME_STEP, timing_setup.integrator))
+    start, march = (
+        np.concatenate(wheels.state())[None],
+        Marcher(rail_wheel_model(wheels, TIME_STEP, timing_setup.integrator)),
+    )
     callback = {
         "none": lambda: None,
         "empty": lambda: empty_law().ctypes,
@@ -247,21 +250,21 @@ def _mujoco_march(timing_setup: ContactTimingSetup, wheels: Wheels, contact_law:
     return job
 
 
-def _exudyn_march(timing_setup: ContactTimingSetup, wheels: Wheels, contact_law: Any) -> Callable[[int], Any]:
+def _exudyn_march(timing_setup: ContactTimingSetup, wheels: RailWheels, contact_law: Any) -> Callable[[int], Any]:
     """Function that simulates a given number of steps in Exudyn."""
     zeros, of = [0.0] * wheels.size, None
     if timing_setup.bridge == "empty":
         of = lambda q, v: zeros  # noqa: E731
     elif timing_setup.bridge != "none":
-        of = Forces(wheels, contact_law).of
+        of = WheelForceFunctions(wheels, contact_law).of
     rolling, state = (
-        Rolling(wheels, of, timing_setup.bridge if timing_setup.bridge in ROUTES else ROUTES[0]),
+        RailWheelSystem(wheels, of, timing_setup.bridge if timing_setup.bridge in ROUTES else ROUTES[0]),
         wheels.state(),
     )
     return lambda steps: rolling.run(*state, steps, TIME_STEP, timing_setup.integrator)
 
 
-def contact_law_of_library(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
+def contact_law_of_library(wheels: RailWheels) -> Callable[[Array, Array, Array, Array], None]:
     """Contact law that calls the library's Python functions: FASTSIM, or the simplified theory of 1983."""
     bodies = separate_patches(wheels.bodies) if wheels.theory == "simplified" else None
 
@@ -292,10 +295,10 @@ def _bridge_cost_rows(measured_times: MeasuredContactTimes) -> list[Row]:
         step, bare, kernel = measured_times.times_by_round(setup)
         name, calls = f"contact_bridges.{setup.engine}.{setup.integrator}", FORCE_CALLS_PER_STEP[setup.integrator]
         if setup.engine == "mujoco":
-            value, low, high = median(step / (bare + kernel))
+            value, low, high = bootstrap_median(step / (bare + kernel))
             what, bound = f"ratio to the step without contact plus {4 * calls} kernel times", 1.3
         else:
-            value, low, high = median((step - bare - kernel) / step)
+            value, low, high = bootstrap_median((step - bare - kernel) / step)
             what, bound = "share of the bridge", 0.25
         what = (
             f"{ENGINE_NAMES[setup.engine]}, {setup.integrator}: {what}, step with FASTSIM at four wheels (21 x 21, "
@@ -308,9 +311,12 @@ def _bridge_cost_rows(measured_times: MeasuredContactTimes) -> list[Row]:
 
 def _equal_bits_in_threads_row() -> Row:
     """Row: runs from ten initial states give the same bits in two threads as in one."""
-    wheels = Wheels()
-    states, built = np.array([np.concatenate(wheels.state(seed)) for seed in range(10)]), model(wheels, 1e-4, "RK4")
-    with installed(kernel_law(forces)):
+    wheels = RailWheels()
+    states, built = (
+        np.array([np.concatenate(wheels.state(seed)) for seed in range(10)]),
+        rail_wheel_model(wheels, 1e-4, "RK4"),
+    )
+    with installed_callback(kernel_law(forces)):
         first, two = (Marcher(built, threads).run(states, 100) for threads in (1, 2))
     same = "identical" if np.isfinite(first).all() and first.tobytes() == two.tobytes() else "different"
     return behaviour_row(
@@ -325,11 +331,11 @@ def _equal_bits_in_threads_row() -> Row:
 
 def _engine_agreement_row() -> Row:
     """Row: difference of the states in Exudyn and MuJoCo after 0.1 s, by Runge-Kutta's method."""
-    wheels, steps = Wheels(), 1000
+    wheels, steps = RailWheels(), 1000
     q, v = wheels.state()
-    with installed(kernel_law(forces)):
-        path = Marcher(model(wheels, 1e-4, "RK4")).run(np.concatenate((q, v))[None], steps)[0]
-    by_engine = Rolling(wheels, Forces(wheels).of).run(q, v, steps, 1e-4, "RK44")
+    with installed_callback(kernel_law(forces)):
+        path = Marcher(rail_wheel_model(wheels, 1e-4, "RK4")).run(np.concatenate((q, v))[None], steps)[0]
+    by_engine = RailWheelSystem(wheels, WheelForceFunctions(wheels).of).run(q, v, steps, 1e-4, "RK44")
     size = wheels.size
     scale = np.repeat([np.abs(path[:, :size]).max(), np.abs(path[:, size:]).max()], size)
     return Observed(

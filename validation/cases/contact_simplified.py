@@ -23,7 +23,7 @@ from models.contact.simplified_theory import (
     solve_rolling_contact,
 )
 from models.contact.undeformed_distance import quadratic
-from models.machine.seconds import cost
+from models.machine.seconds import seconds_text
 from models.machine.timing import interleave
 from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_shapes import (
@@ -311,8 +311,8 @@ def _computing_time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row
         Observed(
             "contact_simplified.time.forces",
             SYSTEM,
-            f"ratio of the time of FASTSIM twice with the refit, {cost(seconds_by_program['roll'])}, to that of "
-            f"the 1982 program, {cost(seconds_by_program['1982'])}",
+            f"ratio of the time of FASTSIM twice with the refit, {seconds_text(seconds_by_program['roll'])}, to that "
+            f"of the 1982 program, {seconds_text(seconds_by_program['1982'])}",
             _computing_time_ratio(seconds_by_program, "roll", "1982"),
             "",
         ).beside("about 3 with the contact, which contact_price compares", why),

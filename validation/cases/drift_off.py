@@ -27,7 +27,7 @@ from models.systems.pitch_plane.trust import (
     noise_error_curve,
 )
 from models.systems.pitch_plane.virtual_measurement import PAPER_FACTORS, perturbed_parameters
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
 from validation.common.scenes import force_scene, on_paper_road, virtual_drive
@@ -163,7 +163,7 @@ def _drift_by_model_error(
         work_folder, scenario.duration, 1 / scenario.sampling_rate, TIME_STEP, road=scenario.road_settings
     )
     assembly = assembly_of_scene(force_scene(work_folder, step=TIME_STEP, duration=scenario.duration))
-    p, other_vehicles = assembly.parameters, list[Parameters]()
+    p, other_vehicles = assembly.parameters, list[PitchPlaneParameters]()
     for i in range(RANDOM_VEHICLE_COUNT):
         factors = np.random.Generator(np.random.Philox(key=[SEED, i])).uniform(0.9, 1.1, len(PAPER_FACTORS))
         other_vehicles.append(

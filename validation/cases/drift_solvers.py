@@ -13,7 +13,7 @@ import numpy as np
 
 from models.core.noise import normal_samples
 from models.core.result import Result
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.drift.growth import pitch_rate_of_forces, pitch_variance, rigid_pitch, sinh_law_rate
 from models.drift.score import section_forces
 from models.engines.assembly import Assembly, Settings
@@ -156,7 +156,7 @@ def _treatment_record(
     """Growth rate of the pitch's standard deviation and damage ratios for one smoothing filter or integration
     scheme."""
     forces = noise_free_assembly.input
-    assert isinstance(forces, Sampled)
+    assert isinstance(forces, SampledSignal)
     settings = Settings(integration_method, time_step, NOISY_SECONDS)
     clean = _noisy_states(engine_name, noise_free_assembly, forces.values, cutoff_frequency, settings)
     rows = np.rint(np.array(GROWTH_WINDOW) / time_step).astype(int)
@@ -193,7 +193,7 @@ def _noisy_states(
 ) -> np.ndarray:
     """States (n, 8) of a run under force samples (n, 2), which are low-passed before the run if ``cutoff_frequency``
     (Hz) is given."""
-    forces = Sampled(_low_passed_forces(force_samples, cutoff_frequency), 1 / NOISE_SAMPLING_RATE, held=False)
+    forces = SampledSignal(_low_passed_forces(force_samples, cutoff_frequency), 1 / NOISE_SAMPLING_RATE, held=False)
     return build(engine_name, replace(assembly, input=forces), solver_settings).run().states
 
 

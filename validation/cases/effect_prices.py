@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from models.engines.protocol import build, guard
-from models.machine.timing import describe, interleave, paired_ratio
+from models.engines.protocol import build, check_trajectory
+from models.machine.timing import interleave, paired_ratio, timing_statistics
 from models.systems.pitch_plane.run import output_channels
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 from validation.absence.bare_cars import ratio_of_cars
@@ -110,7 +110,7 @@ def _time_ratio_to_hand_built(engine_name: str, work_folder: Path, step_count: i
         TIME_STEP * np.arange(step_count + 1),
     )
     gap = float(np.abs(ours.run().states - theirs()).max())
-    jobs = [ours.run, lambda: guard(engine_name, times, theirs(), bare.run.duration), theirs]
+    jobs = [ours.run, lambda: check_trajectory(engine_name, times, theirs(), bare.run.duration), theirs]
     seconds = interleave(
         jobs, round_count, round_interval=(1, 1, ROUNDS_BETWEEN_UNCHECKED_RUNS), clock=time.process_time
     )
@@ -324,7 +324,7 @@ def _price_of_effect(effect_name: str, engine_name: str, work_folder: Path, roun
         "engine": engine_name,
         "adds": changes_text(component_count_changes(effect_name, engine_name, work_folder)) or "nothing",
         "step": float(np.median(seconds[0])) / EFFECT_STEP_COUNT * 1e6,
-        "us": describe(added),
+        "us": timing_statistics(added),
         "ratio": paired_ratio(seconds[1], seconds[0]),
     }
 

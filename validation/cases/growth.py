@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.result import Result
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.drift.growth import (
     FAST_PITCH_FREQUENCY,
     growth_rate,
@@ -115,9 +115,9 @@ def _deviations_by_method(true_run: Result, work_folder: Path, quick: bool) -> S
     return {name: values.tolist() for name, values in spreads.items()}
 
 
-def _force_samples(assembly: Assembly) -> Sampled:
+def _force_samples(assembly: Assembly) -> SampledSignal:
     """The sampled wheel forces of an assembly."""
-    assert isinstance(assembly.input, Sampled)
+    assert isinstance(assembly.input, SampledSignal)
     return assembly.input
 
 

@@ -12,11 +12,11 @@ import numpy as np
 from models.contact.fastsim_many import LOAD, MU, A, B
 from models.engines.free_vehicle_mujoco import FreeMujoco
 from models.engines.mujoco_march import Marcher
-from models.engines.mujoco_quiet import installed
+from models.engines.mujoco_quiet import installed_callback
 from models.machine.compiled import njit
-from models.machine.timing import interleave, median
+from models.machine.timing import bootstrap_median, interleave
 from models.multibody import forces as at
-from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
+from models.multibody.numbers import GRAVITY, Controls, Handling, TyreParameters
 from models.road.plane_waves import plane_waves
 from models.systems.handling.energy import drive_energy, unaccounted_energy
 from models.systems.handling.run import SimulatedDrive, drive_run, driven_model
@@ -148,7 +148,7 @@ def mirror_difference(handling_car: Handling, duration: float) -> float:
 
 def _mirror_row(duration: float) -> Row:
     """Row: a steer step to the left compared with the mirror image of one to the right."""
-    inclined = Handling(R19_CAR, Tyres(inclination=-0.02))
+    inclined = Handling(R19_CAR, TyreParameters(inclination=-0.02))
     return Observed(
         "handling.mirror",
         SYSTEM,
@@ -189,7 +189,7 @@ def _steady_turn_rows() -> list[Row]:
 def _locked_stop_rows() -> list[Row]:
     """Rows: braking force and distance of a stop with locked wheels, compared with Coulomb friction."""
     mu, speed = 0.7, 15.0
-    handling = Handling(R19_CAR_WITHOUT_DRAG, Tyres(friction=mu, fixed=WHEEL_NAMES))
+    handling = Handling(R19_CAR_WITHOUT_DRAG, TyreParameters(friction=mu, fixed=WHEEL_NAMES))
     drive = drive_run("mujoco", handling, speed, 2.0)
     ahead = drive.velocity()[:, 0]
     left = drive["fx"] + drive.largest_tyre_forces()
@@ -241,7 +241,7 @@ def _load_transfer_rows() -> list[Row]:
 
 def _slope_standstill_row() -> Row:
     """Row: drift of a car that stands on a slope with locked wheels."""
-    handling = Handling(R19_CAR, Tyres(fixed=WHEEL_NAMES), slope=SLOPE)
+    handling = Handling(R19_CAR, TyreParameters(fixed=WHEEL_NAMES), slope=SLOPE)
     drive = drive_run("mujoco", handling, 0.0, 2.0, 1e-4)
     last = slice(-2000, None)
     drift = float(np.abs(drive["slip_x"][last].mean(axis=0)).max())
@@ -259,7 +259,11 @@ def _energy_rows() -> list[Row]:
     ):
         for step in (1e-3, 5e-4):
             drive = drive_run(
-                "mujoco", car_in_lane_change(tyres=Tyres(friction=friction), controls=controls), SPEED, 1.0, step
+                "mujoco",
+                car_in_lane_change(tyres=TyreParameters(friction=friction), controls=controls),
+                SPEED,
+                1.0,
+                step,
             )
             gaps[name, step] = float(np.abs(unaccounted_energy(drive)).max())
     start_energy = drive_energy(drive)[0]
@@ -334,7 +338,7 @@ def _tyre_cost_row() -> Row:
     bare.numbers[at.TYRES] = 0.0
     jobs = _timed_march(car, steps), _timed_march(bare, steps), lambda: _repeat_four_tyres(4 * steps)
     full, none, kernel = interleave(jobs, TIMING_ROUNDS, 0.001, clock=time.process_time)
-    ratio, low, high = median(full / (none + kernel) - 1.0)
+    ratio, low, high = bootstrap_median(full / (none + kernel) - 1.0)
     return Observed(
         "handling.price",
         SYSTEM,
@@ -351,7 +355,7 @@ def _equal_bits_in_threads_row() -> Row:
     built = FreeMujoco(driven_model(handling))
     built.model.opt.timestep = 1e-3
     starts = np.array([np.concatenate(handling.straight(speed)) for speed in (20.0, 25.0, 30.0)])
-    with installed(built.law):
+    with installed_callback(built.law):
         serial, both = (Marcher(built.model, threads).run(starts, 50) for threads in (1, 2))
     outcome = "identical" if serial.tobytes() == both.tobytes() else f"{np.abs(serial - both).max():.1e} apart"
     return behaviour_row(
@@ -372,7 +376,7 @@ def _timed_march(handling_car: Handling, step_count: int) -> Callable[[], Any]:
     start, marcher = np.concatenate(handling_car.straight(SPEED))[None], Marcher(built.model)
 
     def job() -> None:
-        with installed(built.law):
+        with installed_callback(built.law):
             marcher.run(start, step_count)
 
     return job

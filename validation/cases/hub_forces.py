@@ -27,7 +27,7 @@ from models.systems.hub_forces.run import inputs_with_angles
 from models.systems.hub_forces.scene import HubScene
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import StatedDeviations, estimate_tilt
-from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut, rigid_vehicle
+from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut_at_hubs, rigid_vehicle
 from models.vehicles.spatial import SpringDamper
 from validation.common.grounds import allowing_breaches
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
@@ -58,7 +58,11 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
     ]
     if quick:
         return rows, {}
-    rows += [*_acceleration_rows("twin", cut(twin(), "body")), *_reproduced_motion_rows(car), *_noise_growth_rows(car)]
+    rows += [
+        *_acceleration_rows("twin", cut_at_hubs(twin(), "body")),
+        *_reproduced_motion_rows(car),
+        *_noise_growth_rows(car),
+    ]
     scenes = {frame: _hub_force_study_scene(frame) for frame in ("hub", "inertial")}
     comparisons = {frame: compare_stabilisers(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
     for frame, comparison in comparisons.items():

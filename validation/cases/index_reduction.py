@@ -13,9 +13,9 @@ from models.core.runge_kutta import runge_kutta_step
 from models.core.time_series import write_time_series
 from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
-from models.engines.reference import derivative_of
+from models.engines.reference import compiled_derivative
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene
-from models.vehicles.description import matrices
+from models.vehicles.description import mass_damping_stiffness
 from models.vehicles.pitch_plane_equations import parameter_numbers
 from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, behaviour_row, not_run
 from validation.common.scenes import force_scene, on_paper_road, virtual_drive
@@ -330,11 +330,11 @@ class IndexOneVehicle:
 
     def __init__(self, assembly: Assembly, baumgarte_rate: float = 0.0, with_projection: bool = False) -> None:
         self.assembly, self.alpha, self.with_projection = assembly, baumgarte_rate, with_projection
-        self._mass = matrices(assembly.vehicle)[0]
+        self._mass = mass_damping_stiffness(assembly.vehicle)[0]
         self._solve = np.linalg.inv(
             np.block([[self._mass, -CONSTRAINT_JACOBIAN.T], [CONSTRAINT_JACOBIAN, np.zeros((1, 1))]])
         )
-        self._free = derivative_of("force", assembly.vehicle.geometry)
+        self._free = compiled_derivative("force", assembly.vehicle.geometry)
         self._p = parameter_numbers(assembly.parameters, assembly.vehicle)
 
     def run(self, time_step: float, duration: float) -> np.ndarray:

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from models.drawing.figures import LABELS
-from models.engines.stability import linearised
+from models.engines.stability import linearised_matrices
 from models.systems.pitch_plane.scene import assembly_of_scene
 from validation.common.rows import CaseAnswer, Observed, Saved, System, Table, not_run
 from validation.common.scenes import road_scene
@@ -90,7 +90,7 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
 def _instruction_counts(work_folder: Path) -> np.ndarray:
     """Numbers of instructions (2 processes, methods, 2 step counts), as the profiler writes them between the runs."""
     work_folder.mkdir()
-    mass, damping, stiffness, *_ = linearised(assembly_of_scene(road_scene()).vehicle)
+    mass, damping, stiffness, *_ = linearised_matrices(assembly_of_scene(road_scene()).vehicle)
     march = {
         "masses": np.diag(mass).tolist(),
         "damping": damping.tolist(),

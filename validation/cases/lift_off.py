@@ -21,7 +21,7 @@ from models.systems.pitch_plane.scene import build as build_scene
 from models.systems.ride.nonlinear import drive_over_road
 from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.systems.ride.scene import build as build_ride
-from models.vehicles.cut_vehicle import cut
+from models.vehicles.cut_vehicle import cut_at_hubs
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common import checks
@@ -319,7 +319,7 @@ def _ride_vehicle_rows(quick: bool) -> list[Row]:
 def _hub_force_rows() -> list[Row]:
     """Rows: hub forces of a car whose wheels leave a class E road: difference of the engines from the reference
     equations, and least force."""
-    car, duration = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body"), 4.0
+    car, duration = cut_at_hubs(load_vehicle("r19_free").with_tyres(pushes_only=True), "body"), 4.0
     left, right = (iso8608_road("E", seed) for seed in (1, 2))
     drive = road_under_wheels(car, left, right, SPEED, 1e-3, round(duration / 1e-3))
     runs = {engine: true_run(engine, car, drive, "inertial", 1e-3, duration) for engine in IMPLEMENTATIONS}

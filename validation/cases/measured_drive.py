@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.scene_file import parse
+from models.core.scene_file import parse_toml
 from models.identification.fit import fit
 from models.identification.of_scene import identification_problem_of
 from models.identification.uncertainty import uncertainty
@@ -47,7 +47,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def _drive_scene(time_stretch: list[float], stiffness_ratios: tuple[float, float] = (1.0, 1.0)) -> HandlingScene:
     """Scene of the measured drive between two times (s), with factors on the cornering stiffness of both axles."""
-    table = parse(SCENE_FOLDER / "measured_drive.toml")
+    table = parse_toml(SCENE_FOLDER / "measured_drive.toml")
     table["tyres"]["cornering"] = list(stiffness_ratios)
     table["manoeuvres"]["measured"]["stretch"] = time_stretch
     return build(table, "measured drive", SCENE_FOLDER)

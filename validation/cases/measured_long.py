@@ -17,7 +17,7 @@ from models.systems.measured.hand_on import write_section_forces
 from models.systems.measured.section_run import AttitudeHold, run
 from models.systems.measured.sections import Sections, guided_bodies
 from models.systems.measured.verdict import channels_to_compare, compare_channel
-from models.vehicles.cut_vehicle import cut
+from models.vehicles.cut_vehicle import cut_at_hubs
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
 from validation.measured.long_recording import (
     SEED,
@@ -57,7 +57,7 @@ def measure(quick: bool, work_folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _guide_force_rows(quick: bool) -> list[Row]:
     """Rows: forces and moments of the suspension guides in a turning, shaken car without symmetry, compared with the
     engines' own sensors."""
-    car, worst = cut(twin(), "body"), 0.0
+    car, worst = cut_at_hubs(twin(), "body"), 0.0
     sections = Sections(car, "hub")
     drive = random_wrenches(car, "hub", has_guide=False)
     numbers, wrenches = build("reference", car, drive, 1e-3, 1e-3).numbers, drive.hubs[0].reshape(-1, 6)

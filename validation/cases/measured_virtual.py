@@ -30,7 +30,7 @@ from models.systems.measured.virtual import (
     map_lines,
     virtual_measurement,
 )
-from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, cut, rigid_vehicle
+from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, cut_at_hubs, rigid_vehicle
 from models.vehicles.vehicle_file import SHIPPED_FOLDER, load_vehicle
 from validation.common.rows import Observed, Row, System, Table, behaviour_row, not_run
 from validation.measured import measured_car
@@ -106,7 +106,7 @@ def measurement_of_test(chain_test: MeasurementChainTest, work_folder: Path, dur
         "frame": chain_test.force_frame,
         "sections": ["front left"],
     }
-    vehicle = cut(load_vehicle(chain_test.vehicle_file, work_folder), "body")
+    vehicle = cut_at_hubs(load_vehicle(chain_test.vehicle_file, work_folder), "body")
     return virtual_measurement(vehicle, read(VirtualTable, table, ""), "mujoco")
 
 
@@ -308,7 +308,7 @@ def _engine_and_free_run_rows(
 
 def _trust_time_rows() -> list[Row]:
     """Rows: median drift-off time of an ensemble divided by the predicted drift-off time."""
-    vehicle, rows = cut(load_vehicle("r19_free"), "body"), list[Row]()
+    vehicle, rows = cut_at_hubs(load_vehicle("r19_free"), "body"), list[Row]()
     bias = np.zeros(6 * len(vehicle.hubs))
     bias[2] = 3.0
     cases = (
@@ -375,7 +375,7 @@ def _moving_car_rows(work_folder: Path) -> list[Row]:
     if path is None:
         id, gyro = "measured_virtual.moving_gyro", f"{what} ratio of the gyro to the camera's angles"
         return [not_run(id, SYSTEM, gyro, f"TWINRIG_DATA does not lead to {moving_car.RECORDING_FILE}")]
-    scene = measured_car.recording_scene(path, cut(load_vehicle("r19_free"), "body"), work_folder)
+    scene = measured_car.recording_scene(path, cut_at_hubs(load_vehicle("r19_free"), "body"), work_folder)
     recording = read_files(scene, work_folder)
     findings = check_recording(recording, None, scene.places, {})
     ratio = next((f.size for f in findings if f.check == "turning" and "pitch_rate" in f.place), None)

@@ -7,15 +7,15 @@ import numpy as np
 
 from models.core.noise import normal_samples
 from models.core.result import Result
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.core.time_series import write_time_series
 from models.engines.assembly import Assembly, Settings
-from models.engines.stability import first_order, linearised
+from models.engines.stability import first_order, linearised_matrices
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene
 from models.systems.pitch_plane.virtual_measurement import BuildFollower, follower_builder, write_measurement
 from models.systems.pitch_plane.virtual_measurement import measure as measure_road
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 from validation.common import checks
 from validation.common.checks import trajectory_gap
 from validation.common.grounds import allowing_breaches
@@ -86,7 +86,7 @@ def run_with_prescribed_motion(scene: Scene, engine_name: str) -> Result:
 
 def _missing_mass_rows(
     parameter_set_name: str,
-    parameters: Parameters,
+    parameters: PitchPlaneParameters,
     measured_run: Result,
     build_follower_scene: BuildFollower,
     work_folder: Path,
@@ -118,7 +118,7 @@ def _missing_mass_rows(
 
 def _shifted_centre_rows(
     parameter_set_name: str,
-    parameters: Parameters,
+    parameters: PitchPlaneParameters,
     measured_run: Result,
     build_follower_scene: BuildFollower,
     work_folder: Path,
@@ -150,7 +150,7 @@ def _dead_band_and_moment_rows(build_follower_scene: BuildFollower, duration: fl
     equations."""
     assembly = assembly_of_scene(build_follower_scene({}, DEAD_BAND_SPRING))
     times = TIME_STEP * np.arange(round(duration / TIME_STEP) + 1)
-    moment = Sampled(500.0 * np.sin(30.0 * times)[:, None], TIME_STEP, held=False)
+    moment = SampledSignal(500.0 * np.sin(30.0 * times)[:, None], TIME_STEP, held=False)
     free = assembly_of_scene(build_follower_scene({}, {}))
     laws: dict[str, tuple[Assembly, str]] = {
         "dead_band": (assembly, "a pitch spring with a dead band of 0.01 rad"),
@@ -176,7 +176,7 @@ def _high_pass_row(build_follower_scene: BuildFollower) -> Row:
     vehicle = assembly_of_scene(
         build_follower_scene({}, {"high_pass": {"cut_off": HIGH_PASS_CUT_OFF, "damping_ratio": ratio}})
     ).vehicle
-    poles = np.linalg.eigvals(first_order(linearised(vehicle)))
+    poles = np.linalg.eigvals(first_order(linearised_matrices(vehicle)))
     wanted = corner * complex(-ratio, np.sqrt(1 - ratio**2))
     off = float(np.abs(poles - wanted).min()) / corner
     return Observed(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.multibody.numbers import Handling, Tyres
+from models.multibody.numbers import Handling, TyreParameters
 from models.road.plane_waves import plane_waves
 from models.systems.handling.energy import drive_energy, unaccounted_energy
 from models.systems.handling.run import SimulatedDrive, drive_run
@@ -39,7 +39,9 @@ def measure(quick: bool, work_folder: Path) -> CaseAnswer:
 
 def _rough_turn(engine_name: str, vehicle: SpatialVehicle, duration: float) -> SimulatedDrive:
     """A turn on a rough road, steered, braked and driven."""
-    return drive_run(engine_name, Handling(vehicle, Tyres(), TURN_CONTROLS, plane_waves(4e-6, seed=3)), SPEED, duration)
+    return drive_run(
+        engine_name, Handling(vehicle, TyreParameters(), TURN_CONTROLS, plane_waves(4e-6, seed=3)), SPEED, duration
+    )
 
 
 def _static_loads_row() -> Row:

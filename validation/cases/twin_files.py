@@ -16,8 +16,8 @@ from models.own_model.certificate import (
     reference_of_file,
 )
 from models.own_model.content import CONTENT_KINDS
-from models.own_model.explain import compare
-from models.own_model.file import ModelFile, read
+from models.own_model.explain import compare_models
+from models.own_model.file import ModelFile, read_model_file
 from models.own_model.path import EQUAL_PATH_SHARE, compare_paths
 from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.own_model.files import (
@@ -75,7 +75,7 @@ def _model_file_of_text(
     """Write the text of a model to an MJCF or URDF file, and read the file."""
     path = work_folder / f"{model_name}{'.urdf' if '<robot' in model_text else '.xml'}"
     path.write_text(model_text, encoding="utf-8")
-    return read(path, ignored_content)
+    return read_model_file(path, ignored_content)
 
 
 def _model_file_of_exported_scene(work_folder: Path, scene_name: str) -> ModelFile:
@@ -145,7 +145,7 @@ def _planted_differences_row(work_folder: Path, quick: bool) -> Row:
     chosen = PLANTED_DIFFERENCES[::5] if quick else PLANTED_DIFFERENCES
     for name, old, new, kind, owner, size in chosen:
         second = _model_file_of_text(work_folder, "planted", model_with_change(JOINTED, name, old, new)).twin
-        influential = compare(first, second, 3).influential
+        influential = compare_models(first, second, 3).influential
         sentence = influential[0].sentence(("original", "planted")) if influential else ""
         named += sentence.startswith(f"{kind} of {owner}: ") and size.replace("b.xml", "planted") in sentence
     quantity = f"planted differences of one number, of {len(chosen)}, whose element and size are named first"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from models.multibody.plain.statics import preloads_at_rest
 from models.vehicles.free_vehicle import CARRIER
-from models.vehicles.spatial_linear import preloads
+from models.vehicles.spatial_linear import static_preloads
 from validation.common.checks import largest_relative_difference
 from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.spatial.written_equations import (
@@ -59,7 +59,7 @@ def _force_law_rows(state_count: int) -> list[Row]:
         )
     ]
     for name, car in rolling_cars().items():
-        preloads_of = preloads(car.vehicle)
+        preloads_of = static_preloads(car.vehicle)
         plain = preloads_at_rest(car.vehicle, CARRIER)
         gap = max(
             largest_relative_difference(other, list(known.values()))

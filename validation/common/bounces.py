@@ -13,8 +13,8 @@ import numpy as np
 from scipy.linalg import expm
 
 from models.engines.assembly import Assembly
-from models.vehicles.description import matrices
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.description import mass_damping_stiffness
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 IN_AIR, PRESSED, DAMPER_LIMITED = range(3)
 SWITCH_BISECTIONS = 52
@@ -28,7 +28,7 @@ class BouncingVehicle:
     def __init__(self, assembly: Assembly, time_step: float) -> None:
         vehicle, self.parameters, self.step = assembly.vehicle, assembly.parameters, time_step
         bare = replace(vehicle, struts=tuple(strut for strut in vehicle.struts if strut.lower.body is not None))
-        mass, damping, stiffness = matrices(bare)
+        mass, damping, stiffness = mass_damping_stiffness(bare)
         weight = np.array([*(body.mass * vehicle.gravity for body in vehicle.bodies), 0.0])
         self.rates = {
             (i, j): _rate_matrix(mass, damping, stiffness, weight, _tyre_laws(self.parameters, (i, j)))
@@ -82,7 +82,7 @@ def _contact_state(spring_force: float, damper_force: float) -> int:
     return DAMPER_LIMITED if damper_force > spring_force else PRESSED
 
 
-def _tyre_laws(parameters: Parameters, contact_states: ContactStates) -> list[tuple[float, float]]:
+def _tyre_laws(parameters: PitchPlaneParameters, contact_states: ContactStates) -> list[tuple[float, float]]:
     """Stiffness (N/m) and damping (N s/m) of the front and rear tyre in their contact states."""
     laws = [
         ((0.0, 0.0), (k, d), (2.0 * k, 0.0))

@@ -13,7 +13,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from models.core.assumptions import BrokenAssumption, broken_of, result_observer
+from models.core.assumptions import BrokenAssumption, broken_assumptions_of, result_observer
 from models.core.result import Result
 
 ANY_ASSUMPTION = ""
@@ -48,7 +48,7 @@ class Grounds:
             f"{run_result.data.attrs['title']}, {run_result.data.attrs['engine']}".strip(", "),
             _ALLOWED_ASSUMPTIONS.get(),
         )
-        for broken in broken_of(run_result):
+        for broken in broken_assumptions_of(run_result):
             self.breaches.append(Breach(name, broken, reasons.get(broken.name) or reasons.get(ANY_ASSUMPTION, "")))
 
     def breaches_of_row(self, is_allowed: bool) -> str:

@@ -13,7 +13,7 @@ from models.contact.fastsim_kernels import march_plain, march_second_order
 from models.contact.fastsim_records import BLOCK, LANE_COUNT
 from models.contact.material import MaterialPair
 from models.machine.compiled import compiled
-from models.machine.timing import median, paired_ratio, spelled
+from models.machine.timing import bootstrap_median, interval_text, paired_ratio
 from validation.common.rows import Observed, Row, System
 
 SYSTEM: System = "contact"
@@ -55,7 +55,7 @@ def speed_rows_and_table(
     }
     took = _processor_times(jobs)
     ratio = {name: paired_ratio(seconds, took["bound"]) for name, seconds in took.items()}
-    calls_took = {n: median(1e6 * took[f"call {n}"]) for n in calls}
+    calls_took = {n: bootstrap_median(1e6 * took[f"call {n}"]) for n in calls}
     rows = [
         Observed(f"fastsim.speed.{name}", SYSTEM, f"{what}, 95 % interval {low:.3g} to {high:.3g}", value, unit).aim(
             most, TIMING_NOTE
@@ -70,7 +70,7 @@ def speed_rows_and_table(
     table = [
         [
             name,
-            f"{spelled(lasted, 1e6)} us" if "call" in name else f"{spelled(lasted, 1e9)} ns per cell",
+            f"{interval_text(lasted, 1e6)} us" if "call" in name else f"{interval_text(lasted, 1e9)} ns per cell",
             "" if "call" in name else f"{ratio[name][0]:.2f}",
         ]
         for name, lasted in took.items()

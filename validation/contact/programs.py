@@ -14,7 +14,7 @@ from models.contact.simplified_theory import (
     SimplifiedRolling,
     solve_rolling_contact,
 )
-from models.machine.seconds import cost
+from models.machine.seconds import seconds_text
 from models.machine.timing import interleave
 from models.systems.contact.run import interpenetration_contact
 from models.systems.contact.work_precision import ContactCase
@@ -107,8 +107,9 @@ def table(program_comparison: dict[str, Any]) -> Table:
         ("time in the paper", "1", "about 3"),
         (
             "time, measured",
-            f"1 ({cost(t['1982'])})",
-            f"{np.median(both / t['1982']):.0f} ({cost(both)}); forces alone {np.median(t['1983'] / t['1982']):.0f}",
+            f"1 ({seconds_text(t['1982'])})",
+            f"{np.median(both / t['1982']):.0f} ({seconds_text(both)}); "
+            f"forces alone {np.median(t['1983'] / t['1982']):.0f}",
         ),
     )
     return Table(

@@ -8,8 +8,8 @@ import numpy as np
 
 from models.contact.inputs import Array
 from models.core.errors import Refused, RunFailed
-from models.engines.contact_bridge import Wheels, linearised_wheels
-from models.engines.contact_bridge_exudyn import Forces, Rolling
+from models.engines.contact_bridge import RailWheels, linearised_wheels
+from models.engines.contact_bridge_exudyn import RailWheelSystem, WheelForceFunctions
 from models.engines.stability import LONG_RUN, longest_stable_step
 from validation.common.rows import Observed, Row, System, Table, behaviour_row
 
@@ -36,9 +36,9 @@ class SlowWheelsRun:
     error: float
 
 
-def wheel_and_start(rolling_speed: float) -> tuple[Wheels, tuple[Array, Array]]:
+def wheel_and_start(rolling_speed: float) -> tuple[RailWheels, tuple[Array, Array]]:
     """A wheel with FASTSIM at a speed (m/s), and the displaced positions and rates from which it is released."""
-    return Wheels(1, speed=rolling_speed), (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
+    return RailWheels(1, speed=rolling_speed), (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
 
 
 def counting_calls(
@@ -59,9 +59,9 @@ def end_positions(
     """Simulate a released wheel: returns final positions and number of force calls. Raises RunFailed or Refused if the
     integrator cannot take the steps."""
     (wheels, start), calls = wheel_and_start(rolling_speed), [0]
-    forces = Forces(wheels)
+    forces = WheelForceFunctions(wheels)
     slopes = forces.slopes if with_force_slopes and integrator_name in METHODS else None
-    rolling = Rolling(wheels, counting_calls(forces.of, calls), force_slopes=slopes)
+    rolling = RailWheelSystem(wheels, counting_calls(forces.of, calls), force_slopes=slopes)
     return rolling.run(*start, step_count, DURATION / step_count, integrator_name)[: wheels.size], calls[0]
 
 

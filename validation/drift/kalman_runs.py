@@ -16,7 +16,7 @@ from models.drift.growth import pitch_spring
 from models.drift.score import SECTION_FORCE_CHANNELS, root_mean_square, section_forces
 from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
-from models.engines.stability import first_order, linearised
+from models.engines.stability import first_order, linearised_matrices
 from models.fatigue.damage import damage_ratio
 from models.systems.pitch_plane.effects.kalman_filter import PULL_BANDWIDTH, guide_of
 from models.systems.pitch_plane.pitch_filter import (
@@ -183,7 +183,9 @@ def relative_state_matrices(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]
     p = assembly.parameters
     pushes = np.zeros((8, 2))
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
-    return RELATIVE_STATES @ first_order(linearised(assembly.vehicle))[:, FILTERED_STATES], RELATIVE_STATES @ pushes
+    return RELATIVE_STATES @ first_order(linearised_matrices(assembly.vehicle))[
+        :, FILTERED_STATES
+    ], RELATIVE_STATES @ pushes
 
 
 def first_order_hold(state_matrix: np.ndarray, input_matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
-from models.core.signals import Sampled, Smooth, Stacked
+from models.core.signals import SampledSignal, Smooth, StackedSignal
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene
@@ -72,12 +72,12 @@ class Bench:
     @cached_property
     def linear_forces(self) -> Assembly:
         """The vehicle under wheel forces that are linear between their samples."""
-        return self.road.without_tyres().with_input("force", Sampled(self._forces(), SAMPLING_PERIOD, held=False))
+        return self.road.without_tyres().with_input("force", SampledSignal(self._forces(), SAMPLING_PERIOD, held=False))
 
     @cached_property
     def held_forces(self) -> Assembly:
         """The vehicle under wheel forces that are constant over each sample."""
-        return self.road.without_tyres().with_input("force", Sampled(self._forces(), SAMPLING_PERIOD, held=True))
+        return self.road.without_tyres().with_input("force", SampledSignal(self._forces(), SAMPLING_PERIOD, held=True))
 
     @cached_property
     def prescribed_pitch(self) -> Assembly:
@@ -85,7 +85,7 @@ class Bench:
         start = self.road.initial
         pitch = Smooth((start[3] + 0.05 * self._oscillation(7.0))[:, None], SAMPLING_PERIOD, derivatives=2, degree=5)
         forces = Smooth(self._forces(), SAMPLING_PERIOD)
-        return self.road.without_tyres().with_input("pitch", Stacked((forces, pitch)))
+        return self.road.without_tyres().with_input("pitch", StackedSignal((forces, pitch)))
 
     @cached_property
     def prescribed_heave_and_pitch(self) -> Assembly:
@@ -93,13 +93,13 @@ class Bench:
         start = self.road.initial
         motion = start[2:4] + np.column_stack([0.01 * self._oscillation(9.0), 0.05 * self._oscillation(7.0)])
         parts = (Smooth(self._forces(), SAMPLING_PERIOD), Smooth(motion, SAMPLING_PERIOD, derivatives=2, degree=5))
-        return self.road.without_tyres().with_input("heave-pitch", Stacked(parts))
+        return self.road.without_tyres().with_input("heave-pitch", StackedSignal(parts))
 
     @cached_property
     def stabilised(self) -> Assembly:
         """The vehicle under sampled wheel forces, with an added moment, and with a pitch spring whose dead band is
         exceeded."""
-        moment = Sampled(3e3 * self._oscillation(31.0)[:, None], SAMPLING_PERIOD, held=False)
+        moment = SampledSignal(3e3 * self._oscillation(31.0)[:, None], SAMPLING_PERIOD, held=False)
         spring = PitchSpring("chassis", 5e4, 500.0, 2e-3)
         vehicle = replace(self.held_forces.vehicle, pitch_springs=(spring,))
         return replace(self.held_forces, vehicle=vehicle).with_moment(moment)

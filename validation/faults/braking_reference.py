@@ -142,7 +142,7 @@ def _double_drag(handling_car: Handling) -> None:
 
 def _preload_patch(change_preloads: Callable[[Preloads], Preloads]) -> Patch:
     return attribute_patch(
-        "models.multibody.numbers:preloads", lambda real: lambda vehicle: change_preloads(real(vehicle))
+        "models.multibody.numbers:static_preloads", lambda real: lambda vehicle: change_preloads(real(vehicle))
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.engines.assembly import Assembly
 from models.road.iso8608 import iso8608_road
-from models.vehicles.description import Body, PitchSpring, Point, Strut, Vehicle
+from models.vehicles.description import PitchSpring, PlaneBody, PlaneVehicle, Point, Strut
 
 AssemblyChange = Callable[[Assembly], Assembly]
 
@@ -18,7 +18,7 @@ def unchanged(assembly: Assembly) -> Assembly:
     return assembly
 
 
-def changed_vehicle_of(change_vehicle: Callable[[Vehicle], Vehicle]) -> AssemblyChange:
+def changed_vehicle_of(change_vehicle: Callable[[PlaneVehicle], PlaneVehicle]) -> AssemblyChange:
     """Fault: the vehicle's description is changed."""
     return lambda assembly: replace(assembly, vehicle=change_vehicle(assembly.vehicle))
 
@@ -27,18 +27,18 @@ def replaced_struts(change_strut: Callable[[Strut, dict[str, Strut]], Strut]) ->
     """Fault: each strut is replaced by change_strut(strut, struts), where ``struts`` are all struts of the vehicle by
     name."""
 
-    def changed(original_vehicle: Vehicle) -> Vehicle:
+    def changed(original_vehicle: PlaneVehicle) -> PlaneVehicle:
         named = {strut.name: strut for strut in original_vehicle.struts}
         return replace(original_vehicle, struts=tuple(change_strut(strut, named) for strut in original_vehicle.struts))
 
     return changed_vehicle_of(changed)
 
 
-def replaced_bodies(change_body: Callable[[Body, dict[str, Body]], Body]) -> AssemblyChange:
+def replaced_bodies(change_body: Callable[[PlaneBody, dict[str, PlaneBody]], PlaneBody]) -> AssemblyChange:
     """Fault: each body is replaced by change_body(body, bodies), where ``bodies`` are all bodies of the vehicle by
     name."""
 
-    def changed(original_vehicle: Vehicle) -> Vehicle:
+    def changed(original_vehicle: PlaneVehicle) -> PlaneVehicle:
         named = {body.name: body for body in original_vehicle.bodies}
         return replace(original_vehicle, bodies=tuple(change_body(body, named) for body in original_vehicle.bodies))
 
@@ -86,13 +86,13 @@ def undamped_tyre(strut: Strut, all_struts: dict[str, Strut]) -> Strut:
     return replace(strut, damping=0.0) if strut.name.startswith("tyre") else strut
 
 
-def swapped_wheel(body: Body, all_bodies: dict[str, Body]) -> Body:
+def swapped_wheel(body: PlaneBody, all_bodies: dict[str, PlaneBody]) -> PlaneBody:
     """Fault: a wheel has the mass of the other wheel."""
     other_wheel = {"wheel1": "wheel2", "wheel2": "wheel1"}.get(body.name, body.name)
     return replace(body, mass=all_bodies[other_wheel].mass)
 
 
-def mixed_inertia(body: Body, all_bodies: dict[str, Body]) -> Body:
+def mixed_inertia(body: PlaneBody, all_bodies: dict[str, PlaneBody]) -> PlaneBody:
     """Fault: mass and inertia of the chassis are exchanged."""
     return body if body.pitch_inertia is None else replace(body, mass=body.pitch_inertia, pitch_inertia=body.mass)
 
@@ -101,7 +101,7 @@ def inertia_about_axle(assembly: Assembly) -> Assembly:
     """Fault: the pitch inertia is taken about the front axle instead of the centre of mass."""
     b = assembly.parameters.b
 
-    def change(body: Body, all_bodies: dict[str, Body]) -> Body:
+    def change(body: PlaneBody, all_bodies: dict[str, PlaneBody]) -> PlaneBody:
         axle_inertia = None if body.pitch_inertia is None else body.pitch_inertia + body.mass * b**2
         return replace(body, pitch_inertia=axle_inertia)
 

@@ -61,7 +61,7 @@ def wrench_reading_patch(
 
         return planted
 
-    return attribute_patch("models.engines.cut_vehicle:table", table)
+    return attribute_patch("models.engines.cut_vehicle:cut_vehicle_table", table)
 
 
 FAULTS = (

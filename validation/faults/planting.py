@@ -217,7 +217,7 @@ ADAPTER_FAULTS = (
     EngineFault(
         "callback never installed",
         MUJOCO_ONLY,
-        patch=attribute_patch("models.engines.mujoco:installed", patches.callback_not_installed),
+        patch=attribute_patch("models.engines.mujoco:installed_callback", patches.callback_not_installed),
     ),
 )
 """Faults in the code of an engine's adapter."""

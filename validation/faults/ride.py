@@ -16,7 +16,7 @@ from models.ride.weighting import WEIGHTINGS, weighting_of_standard
 from models.road import two_track
 from models.road.excitation import RoadExcitation
 from models.vehicles import spatial_linear, vehicle_file
-from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition, eigenvalues
+from models.vehicles.linear_vehicle import LinearOutput, LinearVehicle, WheelPosition, eigenvalues
 from models.vehicles.spatial import SpatialVehicle
 from validation.faults.campaign import Campaign, CampaignFault, Check
 from validation.faults.patches import Patch, attribute_patch
@@ -81,7 +81,7 @@ def _road_height_errors() -> float:
     no, unit = np.zeros(len(vehicle.mass)), np.eye(len(vehicle.wheels))
     left = sum(unit[i] for i, wheel in enumerate(vehicle.wheels) if wheel.y > 0)
     rows = [*unit, left]
-    outputs = tuple(Output(str(i), "m", "road", no, no, no, row, 0.0 * row) for i, row in enumerate(rows))
+    outputs = tuple(LinearOutput(str(i), "m", "road", no, no, no, row, 0.0 * row) for i, row in enumerate(rows))
     road = two_track.road_excitation(two_track.road_of_level(two_track.half_track(vehicle.wheels)), vehicle.wheels)
     from models.ride import excited
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.multibody import forces as at
-from models.multibody.numbers import Controls, Handling, Tyres
+from models.multibody.numbers import Controls, Handling, TyreParameters
 from models.systems.handling.energy import bodies_energy
 from models.systems.handling.run import build_in_engine
 from models.vehicles.vehicle_file import load_vehicle
@@ -52,7 +52,7 @@ def _mirror_error() -> float:
 
 def _read_report(handling_car: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     report, ledger = np.empty((1, len(handling_car.vehicle.tyres), at.REPORTED)), np.empty((1, at.LEDGER))
-    at.reports(handling_car.numbers, np.zeros(1), q[None].copy(), v[None].copy(), report, ledger)
+    at.fill_reports(handling_car.numbers, np.zeros(1), q[None].copy(), v[None].copy(), report, ledger)
     return report[0], ledger[0]
 
 
@@ -70,7 +70,7 @@ def _energy_balance_error() -> float:
 
 def _locked_wheel_error() -> float:
     """Relative error of the force on locked wheels, which should be mu N against the sliding velocity."""
-    car = Handling(load_vehicle("r19_free"), Tyres(cells=11, fixed=("fl", "fr", "rl", "rr")))
+    car = Handling(load_vehicle("r19_free"), TyreParameters(cells=11, fixed=("fl", "fr", "rl", "rr")))
     report, _ = _read_report(car, *car.straight(15.0))
     return float(np.abs(report[:, at.FX] / (car.tyres.friction * report[:, at.PRESS]) + 1.0).max())
 
@@ -109,7 +109,7 @@ def tyre_table_patch(
 
         return planted
 
-    return attribute_patch("models.multibody.numbers:table", table)
+    return attribute_patch("models.multibody.numbers:free_vehicle_table", table)
 
 
 FAULTS = tuple(

@@ -196,7 +196,9 @@ FAULTS = (
     CampaignFault("preload of a spring 1 % off, cut", "preload", _preload_patch("models.vehicles.cut_vehicle")),
     CampaignFault("one wave of the road 1 % higher", "road", attribute_patch(f"{TABLE_WRITER}:table", _scaled_wave)),
     CampaignFault(
-        "road under one hub 0.1 mm higher", "road", attribute_patch("models.engines.cut_vehicle:table", _raised_sample)
+        "road under one hub 0.1 mm higher",
+        "road",
+        attribute_patch("models.engines.cut_vehicle:cut_vehicle_table", _raised_sample),
     ),
     CampaignFault(
         "axes of springs fixed in space",
@@ -218,12 +220,12 @@ FAULTS = (
     CampaignFault(
         "inertia of the chassis 1 % off, on tyres",
         "inertia",
-        attribute_patch("models.systems.handling.run:Driven", _changed_inertia(lambda inertia: 1.01 * inertia)),
+        attribute_patch("models.systems.handling.run:LoadedVehicle", _changed_inertia(lambda inertia: 1.01 * inertia)),
     ),
     CampaignFault(
         "products of inertia with the other sign, cut",
         "inertia",
-        attribute_patch("models.engines.cut_vehicle:Driven", _changed_inertia(_turned_products)),
+        attribute_patch("models.engines.cut_vehicle:LoadedVehicle", _changed_inertia(_turned_products)),
     ),
     CampaignFault(
         "shares of brake and drive swapped in the table",

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.engines.protocol import build
 from models.sensors.rigid_body_motion import (
     BodyStartState,
@@ -63,7 +63,9 @@ def _readings_of_run(
         effects={"accelerometers": {"sampling_rate": 1 / SAMPLE_PERIOD, "sensors": sensors, "deviation": noise}},
     )
     assembly = (
-        base if start_state is None else driven_by_forces(base, Sampled(np.zeros((400, 2)), SAMPLE_PERIOD, held=True))
+        base
+        if start_state is None
+        else driven_by_forces(base, SampledSignal(np.zeros((400, 2)), SAMPLE_PERIOD, held=True))
     )
     engine_settings = run_settings(engine_name, SAMPLE_PERIOD, 0.3)
     model = build(engine_name, assembly, engine_settings)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from models.brake.controllers import CONTROLLERS
-from models.core.discretisation import errors_of
+from models.core.discretisation import error_estimates_of
 from models.core.errors import InputError
 from models.core.noise import normal_samples
 from models.core.signals import signal_from_samples
@@ -98,7 +98,7 @@ def error_ratio_over_waves(engine_name: str, work_folder: Path) -> float:
     if engine_name == "reference":
         raise InputError("", "engine", engine_name, "handling is marched by engines")
     stated_run = run(car_scene(speed=1000.0, rough=True), engine_name, error=True)
-    name, estimate = max(errors_of(stated_run).items(), key=lambda each: each[1].share)
+    name, estimate = max(error_estimates_of(stated_run).items(), key=lambda each: each[1].share)
     fine = principal_series(run(car_scene(1e-4, speed=1000.0, rough=True), engine_name).detail).channels[name][::10]
     error_of_values = principal_series(stated_run.detail).channels[name] - fine
     return float(np.sqrt(np.mean(error_of_values**2))) / estimate.error if estimate.warned else np.inf

@@ -5,7 +5,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly
 from models.systems.pitch_plane.effects.contact_points import contact_points
@@ -30,7 +30,7 @@ def step_response_error(engine_name: str, work_folder: Path) -> float:
     values[1:] = WHEEL_LOAD
     p, worst = base.parameters, 0.0
     for step in TIME_STEPS:
-        assembly = driven_by_forces(base, Sampled(values, 2e-2, held=True))
+        assembly = driven_by_forces(base, SampledSignal(values, 2e-2, held=True))
         if engine_name == "exudyn":  # its implicit integrators refuse held samples
             path = run(engine_name, assembly, min(step, 2e-3), 0.1)
         else:
@@ -68,7 +68,7 @@ def _ramp_error(engine_name: str, time_step: float, integrator_name: str) -> flo
     """Largest difference of the tyre compression from the ramp's closed form at the time of each row, divided by
     f/k."""
     base, rising = vehicle(), WHEEL_LOAD * np.minimum(np.arange(6.0), 1.0)[:, None] * np.ones(2)
-    assembly, p = driven_by_forces(base, Sampled(rising, 2e-2, held=False)), base.parameters
+    assembly, p = driven_by_forces(base, SampledSignal(rising, 2e-2, held=False)), base.parameters
     path = run(engine_name, assembly, time_step, 0.1, integrator_name)
     return largest_magnitude(_compressions(assembly, path)[:, 0] - _compression_under_ramp(path.times, p.k1, p.d1)) / (
         WHEEL_LOAD / p.k1
@@ -96,7 +96,7 @@ def undamped_contact_error(engine_name: str, work_folder: Path) -> float:
     compression divided by f/k."""
     base = vehicle(d1=0.0, d2=0.0)
     values = WHEEL_LOAD * np.random.default_rng(4).standard_normal((100, 2))
-    assembly = driven_by_forces(base, Sampled(values, 1e-3, held=True))
+    assembly = driven_by_forces(base, SampledSignal(values, 1e-3, held=True))
     path = run(engine_name, assembly, 1e-3, 0.1)
     stiffness = base.parameters.k1
     return largest_magnitude(_compressions(assembly, path)[:100] - values / stiffness) / (WHEEL_LOAD / stiffness)

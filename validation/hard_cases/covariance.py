@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.engines.assembly import Assembly
 from models.systems.pitch_plane.tangent import TangentPath as ErrorPath
 from models.systems.pitch_plane.tangent import noise_covariances
@@ -46,7 +46,7 @@ def covariance_error(engine_name: str, work_folder: Path) -> float:
 def _covariance_recursion() -> np.ndarray:
     """Covariance of the states after all samples under force errors of 1 N, by the recursion along the path."""
     assembly = vehicle_with_added_forces(np.zeros((SAMPLES, 2)))
-    assert isinstance(assembly.input, Sampled)
+    assert isinstance(assembly.input, SampledSignal)
     return noise_covariances(ErrorPath(assembly, assembly.input, round(SAMPLE_PERIOD / STEP), SAMPLES), 1.0)[-1]
 
 
@@ -55,10 +55,10 @@ def van_loan_naive_result(work_folder: Path) -> str:
     discretisation."""
     from filterpy.common import van_loan_discretization
 
-    from models.engines.stability import first_order, linearised
+    from models.engines.stability import first_order, linearised_matrices
 
     base = vehicle_with_added_forces(np.zeros((SAMPLES, 2)))
-    p, linear = base.parameters, linearised(base.vehicle)
+    p, linear = base.parameters, linearised_matrices(base.vehicle)
     pushes = np.zeros((8, 2))
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
     smallest = []

@@ -15,7 +15,7 @@ from models.measured.axle_forces import FILE_REMEDIES, AxleForces, check_axle_fo
 from models.measured.signal import MeasuredSignal
 from models.systems.pitch_plane.run import run as simulate
 from models.vehicles.parameters.asymmetric_twin import PARAMETERS as TWIN
-from models.vehicles.plausible_plane import plausible_plane
+from models.vehicles.plausible_plane import implausible_plane_values
 from validation.common.scenes import road_scene
 from validation.hard_cases.case import IMPLEMENTATIONS, HardCase, OutcomeWord
 
@@ -86,7 +86,7 @@ def _missed_doubt_error(change_forces: ForceChange, is_doubted: bool, _: str, wo
 
 def _unqueried_vehicle_error(parameter_changes: dict[str, float], _: str, work_folder: Path) -> float:
     """1 if the check of vehicle parameters has no doubt about a vehicle with changed parameters, else 0."""
-    return float(not plausible_plane(TWIN.model_copy(update=parameter_changes)))
+    return float(not implausible_plane_values(TWIN.model_copy(update=parameter_changes)))
 
 
 def _input_check_case(

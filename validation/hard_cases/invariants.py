@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.result import Result
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.engines.assembly import Assembly, Mode
 from models.engines.protocol import build
 from models.systems.pitch_plane.run import run as simulate
@@ -174,13 +174,13 @@ DRIVE_DURATION = 8.0
 
 
 @cache
-def _measured_forces() -> Sampled:
+def _measured_forces() -> SampledSignal:
     """Wheel forces (N) of a drive on the study road, sampled at 1 kHz."""
     scene = build_scene(
         {"title": "", "run": {"duration": DRIVE_DURATION}, "effects": {"road": {"source": "study", "speed": 20.0}}}
     )
     result: Result = simulate(scene, "reference")
-    return Sampled(np.column_stack([result["f1"], result["f2"]]), 1e-3, held=False)
+    return SampledSignal(np.column_stack([result["f1"], result["f2"]]), 1e-3, held=False)
 
 
 def pitch_error_growth(engine_name: str, drive_mode: Mode) -> float:

@@ -11,7 +11,7 @@ from filterpy.kalman import ExtendedKalmanFilter
 from scipy.linalg import expm
 
 from models.core.noise import PITCH_SENSOR, normal_samples
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.core.time_series import write_time_series
 from models.systems.pitch_plane.pitch_filter import PITCH, RELATIVE_STATES, PitchMeasurement, PitchStep, estimate_pitch
 from models.systems.pitch_plane.run import run as simulate
@@ -134,7 +134,7 @@ def stiff_process_noise_error(engine_name: str, work_folder: Path) -> float:
     """Case: process noise of a filter with forces at 10 Hz, for a vehicle with a pole at -697 1/s. Error: relative
     difference from the exact covariance."""
     base = vehicle(geometry="linear")
-    forces = Sampled(static_forces(base, 2, SLOW_SAMPLE_PERIOD).values, SLOW_SAMPLE_PERIOD, held=True)
+    forces = SampledSignal(static_forces(base, 2, SLOW_SAMPLE_PERIOD).values, SLOW_SAMPLE_PERIOD, held=True)
     step = PitchStep(driven_by_forces(base, forces), SLOW_SAMPLE_PERIOD, 1)
     early = step.advance(np.append(RELATIVE_STATES @ base.initial, 0.0), 0)[2][:6]
     wanted = _exact_response()[2]

@@ -26,7 +26,7 @@ from models.road.signal import RoadUnderWheels
 from models.systems.hub_forces.measurement import road_under_wheels, true_run
 from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
-from models.vehicles.cut_vehicle import cut
+from models.vehicles.cut_vehicle import cut_at_hubs
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.bounces import BouncingVehicle, bounce_energy
@@ -167,7 +167,7 @@ def dropped_car_error(engine_name: str, work_folder: Path) -> float:
 def largest_hub_force_in_air(engine_name: str, work_folder: Path) -> float:
     """Case: hub forces on a class F road. Error: largest force (N) or moment on a hub whose wheel is in the air;
     infinite if no wheel is."""
-    car = cut(load_vehicle("r19_free").with_tyres(pushes_only=True), "body")
+    car = cut_at_hubs(load_vehicle("r19_free").with_tyres(pushes_only=True), "body")
     left, right = (iso8608_road("F", seed) for seed in (1, 2))
     drive = road_under_wheels(car, left, right, 20.0, 1e-3, 1500)
     wrenches = true_run(engine_name, car, drive, "inertial", 1e-3, 1.5).wrenches

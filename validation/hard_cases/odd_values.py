@@ -17,7 +17,7 @@ from models.contact.material import MaterialPair
 from models.contact.profiles import profile_of_points
 from models.contact.standard_profiles import built_in_profile
 from models.contact.theories import ExactTheoryOnEllipse, FastsimTheory
-from models.core.result import Result, load
+from models.core.result import Result, load_result
 from models.drift.growth import drift_off_time
 from models.drift.point_mass import euler_covariance
 from models.ensemble.statistics import deviation_with_error, quantile_with_interval
@@ -30,7 +30,7 @@ from models.systems.hub_forces.measurement import HubForces, MeasuredAngles
 from models.systems.hub_forces.tilt_filter import StatedDeviations, estimate_tilt
 from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.systems.ride.scene import build
-from models.vehicles.cut_vehicle import cut
+from models.vehicles.cut_vehicle import cut_at_hubs
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
@@ -103,7 +103,7 @@ def scaled_drift_off_error(engine_name: str, work_folder: Path) -> float:
 def overconfident_filter_ratio(engine_name: str, work_folder: Path) -> float:
     """Case: a tilt filter with stated deviations of 1e-12 for angles and rates, and force noise of 1 N or 8 N. Error:
     the filter's deviations divided by the stated ones."""
-    vehicle, angles = cut(load_vehicle("r19_free"), "body"), MeasuredAngles(np.zeros((5000, 4)), 2e-3)
+    vehicle, angles = cut_at_hubs(load_vehicle("r19_free"), "body"), MeasuredAngles(np.zeros((5000, 4)), 2e-3)
     forces = HubForces(np.zeros((5000, 6 * len(vehicle.hubs))), 2e-3, "hub")
     fits = [
         estimate_tilt(
@@ -122,7 +122,7 @@ def flipped_bit_error(engine_name: str, work_folder: Path) -> float:
     content = bytearray((work_folder / "run.nc").read_bytes())
     content[content.index(heave.tobytes()) + 100] ^= 4
     (work_folder / "run.nc").write_bytes(content)
-    return float(np.abs(load(work_folder / "run.nc")["z3"] - heave).max())
+    return float(np.abs(load_result(work_folder / "run.nc")["z3"] - heave).max())
 
 
 def profile_with_spike() -> Any:

@@ -7,7 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from models.core.signals import Sampled, Signal
+from models.core.signals import SampledSignal, Signal
 from models.core.trajectory import Trajectory
 from models.engines import exudyn as exudyn_engine
 from models.engines.assembly import Assembly
@@ -47,7 +47,7 @@ def guided_assembly(sample_period: float = SAMPLE_PERIOD, noise_deviation: float
     return setups.guided_vehicle(_settled_assembly(base), _weight_forces(), smooth_pitch(samples, sample_period))
 
 
-def _weight_forces() -> Sampled:
+def _weight_forces() -> SampledSignal:
     return static_forces(vehicle(), 2, DURATION, is_held=False)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.scene_file import parse
+from models.core.scene_file import parse_toml
 from models.ride.covariance import DIFFUSING, INFINITE, stationary_covariance
 from models.ride.excited import vehicle_with_road
 from models.ride.frequency import variances_by_quadrature
@@ -231,7 +231,7 @@ def wrong_entry_case(spoil_table: VehicleTableChange, expected_error_place: str)
     """Case: the half car's file with a wrong entry must be refused with the entry's name."""
 
     def error(engine_name: str, work_folder: Path) -> float:
-        table = parse(SHIPPED_FOLDER / "half_car.toml")
+        table = parse_toml(SHIPPED_FOLDER / "half_car.toml")
         spoil_table(table)
         try:
             vehicle = build_vehicle(table, "half_car.toml")

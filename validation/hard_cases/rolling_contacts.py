@@ -16,12 +16,12 @@ import numpy as np
 from scipy.integrate import simpson
 
 from models.core.trajectory import Trajectory
-from models.engines.contact_bridge import Wheels, add_forces, check_step, forces
-from models.engines.contact_bridge_exudyn import Forces, Rolling
-from models.engines.contact_bridge_mujoco import model
+from models.engines.contact_bridge import RailWheels, add_forces, check_step, forces
+from models.engines.contact_bridge_exudyn import RailWheelSystem, WheelForceFunctions
+from models.engines.contact_bridge_mujoco import rail_wheel_model
 from models.engines.mujoco_callback import kernel_law
-from models.engines.mujoco_quiet import installed
-from models.multibody.numbers import Handling, Tyres
+from models.engines.mujoco_quiet import installed_callback
+from models.multibody.numbers import Handling, TyreParameters
 from models.multibody.plain.march import march
 from models.rail.energy import energy_ledger
 from models.rail.equations import WheelsetEquations
@@ -38,22 +38,22 @@ SLIDING_VELOCITIES = np.array(
     [[0.02, 0.01, 0.0, 0.3], [-0.3, 0.1, 0.0, -2.0], [1e-6, -2e-6, 0.0, 1e-4], [0.0, 0.0, 0.0, 1.0]]
 )
 """Velocities (4, 4) of four wheels: x', y', z' (m/s), yaw' (rad/s)."""
-LOCKED_TYRES = Tyres(cells=11, fixed=("fl", "fr", "rl", "rr"))
+LOCKED_TYRES = TyreParameters(cells=11, fixed=("fl", "fr", "rl", "rr"))
 HILL_WAVES = np.array([[2.0 * np.pi / 10.0, 0.0, -0.08, 0.0], [0.0, 0.0, 0.08, 0.0]])
 """Road waves of a hill 16 cm high and 10 m long, flat at the start."""
 R19_VEHICLE = replace(load_vehicle("r19_free"), drags=())
 
 
-def rig_forces(engine_name: str, wheels: Wheels, wheel_velocities: np.ndarray) -> np.ndarray:
+def rig_forces(engine_name: str, wheels: RailWheels, wheel_velocities: np.ndarray) -> np.ndarray:
     """Contact forces (4, 4) on the rig's wheels, which are at fixed positions and have velocities (4, 4)."""
     q, v, f = np.zeros(wheels.size), wheel_velocities.ravel(), np.zeros(wheels.size)
     if engine_name == "exudyn":
-        f = np.array(Forces(wheels).of(list(q), list(v)))
+        f = np.array(WheelForceFunctions(wheels).of(list(q), list(v)))
     elif engine_name == "mujoco":
-        rig = model(replace(wheels, stiffness=(0.0,) * 4, damping=(0.0,) * 4), 1e-7)
+        rig = rail_wheel_model(replace(wheels, stiffness=(0.0,) * 4, damping=(0.0,) * 4), 1e-7)
         data = mujoco.MjData(rig)
         data.qvel[:] = v
-        with installed(kernel_law(forces)):
+        with installed_callback(kernel_law(forces)):
             mujoco.mj_forward(rig, data)
         f = data.qfrc_passive.copy()
     else:
@@ -61,7 +61,7 @@ def rig_forces(engine_name: str, wheels: Wheels, wheel_velocities: np.ndarray) -
     return f.reshape(-1, 4)
 
 
-def excess_over_friction_limit(wheels: Wheels, forces: np.ndarray) -> float:
+def excess_over_friction_limit(wheels: RailWheels, forces: np.ndarray) -> float:
     """Largest tangential force divided by mu N, minus 1; infinite if a contact gains energy."""
     if (forces * SLIDING_VELOCITIES).sum(axis=1).max() > 0.0 or not np.isfinite(forces).all():
         return np.inf
@@ -74,7 +74,7 @@ def friction_excess(engine_name: str, work_folder: Path, **rig_changes: Any) -> 
     shares = []
     for theory in ("fastsim", "simplified"):
         for speed in (20.0, 0.0, -20.0):
-            wheels = Wheels(theory=theory, cells=7, speed=speed, **rig_changes)
+            wheels = RailWheels(theory=theory, cells=7, speed=speed, **rig_changes)
             shares.append(excess_over_friction_limit(wheels, rig_forces(engine_name, wheels, SLIDING_VELOCITIES)))
     return max(shares)
 
@@ -84,7 +84,9 @@ def reversal_force_jump(engine_name: str, work_folder: Path) -> float:
     N."""
     shares = []
     for middle in (-REGULARISED_SPEED, 0.0, REGULARISED_SPEED):
-        backwards, forwards_wheels = (Wheels(cells=7, speed=middle + speed_offset) for speed_offset in (-1e-9, 1e-9))
+        backwards, forwards_wheels = (
+            RailWheels(cells=7, speed=middle + speed_offset) for speed_offset in (-1e-9, 1e-9)
+        )
         change = rig_forces(engine_name, forwards_wheels, SLIDING_VELOCITIES) - rig_forces(
             engine_name, backwards, SLIDING_VELOCITIES
         )
@@ -94,7 +96,7 @@ def reversal_force_jump(engine_name: str, work_folder: Path) -> float:
 
 def pure_spin_force_error(engine_name: str, work_folder: Path) -> float:
     """Case: wheels with pure spin. Error: longitudinal force divided by mu N; infinite if there is no lateral force."""
-    wheels = Wheels(cells=7)
+    wheels = RailWheels(cells=7)
     shares = rig_forces(engine_name, wheels, SLIDING_VELOCITIES[[3, 3, 3, 3]]) / (wheels.mu * wheels.load)
     return float(np.abs(shares[:, 0]).max()) if np.abs(shares[:, 1]).min() > 1e-3 else np.inf
 
@@ -102,12 +104,12 @@ def pure_spin_force_error(engine_name: str, work_folder: Path) -> float:
 def too_long_step_error(engine_name: str, work_folder: Path) -> float:
     """Case: a step of 1 ms at 0.1 m/s, explicit or implicit without slopes of the contact forces, which must be refused
     or fail. Error: infinite if it does not."""
-    wheels = Wheels(1, speed=0.1)
+    wheels = RailWheels(1, speed=0.1)
     start = (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
     if engine_name == "exudyn":
-        Rolling(wheels, Forces(wheels).of).run(*start, 200, 1e-3, "GeneralizedAlpha")
+        RailWheelSystem(wheels, WheelForceFunctions(wheels).of).run(*start, 200, 1e-3, "GeneralizedAlpha")
     elif engine_name == "mujoco":
-        model(wheels, 1e-3, "RK4")
+        rail_wheel_model(wheels, 1e-3, "RK4")
     else:
         check_step("reference", wheels, "RK4", 1e-3)
     return np.inf
@@ -155,7 +157,7 @@ def energy_balance_error(car_drive: SimulatedDrive) -> float:
 def ramp_jump_error(engine_name: str, work_folder: Path) -> float:
     """Case: a car leaves a ramp with all wheels and lands. Error: that of its energy balance divided by the initial
     energy."""
-    run = car_run(engine_name, Handling(R19_VEHICLE, Tyres(cells=7), waves=HILL_WAVES), 25.0, 0.5, 5e-4)
+    run = car_run(engine_name, Handling(R19_VEHICLE, TyreParameters(cells=7), waves=HILL_WAVES), 25.0, 0.5, 5e-4)
     loads = run["load"]
     in_air = (loads == 0.0).all(axis=1)
     if violates_friction(run) or not in_air.any() or (loads[-1] == 0.0).any():
@@ -178,7 +180,7 @@ def locked_wheel_error(engine_name: str, work_folder: Path) -> float:
 def roll_back_error(engine_name: str, work_folder: Path) -> float:
     """Case: a car rolls up a slope, stops and rolls back. Error: that of its energy balance divided by the initial
     energy."""
-    run = car_run(engine_name, Handling(R19_VEHICLE, Tyres(cells=7), slope=0.3), 0.005, 0.006, 4e-5)
+    run = car_run(engine_name, Handling(R19_VEHICLE, TyreParameters(cells=7), slope=0.3), 0.005, 0.006, 4e-5)
     forward_speed = run.velocity()[:, 0]
     if violates_friction(run) or not forward_speed[0] > 0.0 > forward_speed[-1]:
         return np.inf

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.core.discretisation import Estimate, errors_of, largest_estimate
+from models.core.discretisation import Estimate, error_estimates_of, largest_estimate
 from models.core.errors import InputError
 from models.core.result import Result
-from models.core.signals import SNAP_SHARE, Sampled
+from models.core.signals import SNAP_SHARE, SampledSignal
 from models.core.time_series import write_time_series
 from models.engines.protocol import build
-from models.engines.stability import first_order, linearised
+from models.engines.stability import first_order, linearised_matrices
 from models.road.continuation import road_with_run_in
 from models.road.polyline import PolylineProfile
 from models.road.profile import SplineProfile
@@ -41,7 +41,7 @@ def momentum_error(
 ) -> float:
     """Error of the momentum sum m z' against the exact impulse of the wheel forces, divided by the largest impulse."""
     base = vehicle("asymmetric_twin")
-    forces = Sampled(force_samples, sample_period, held=interpolation == "held")
+    forces = SampledSignal(force_samples, sample_period, held=interpolation == "held")
     steps = round((len(force_samples) - 1) * sample_period / time_step)
     path = run(engine_name, setups.driven_by_forces(base, forces), time_step, steps * time_step)
     p, stride = base.parameters, round(sample_period / time_step)
@@ -85,7 +85,7 @@ def impulse_naive_result(work_folder: Path) -> str:
     base = vehicle()
     values = static_forces(base, 1002, 2e-3, noise_deviation=800.0).values
     ends = [
-        run("reference", setups.driven_by_forces(base, Sampled(values, 2e-3, is_held)), 1e-3, 2.0).states[-1, 3]
+        run("reference", setups.driven_by_forces(base, SampledSignal(values, 2e-3, is_held)), 1e-3, 2.0).states[-1, 3]
         for is_held in (True, False)
     ]
     return f"held and linear end {abs(ends[0] - ends[1]) / abs(ends[0]):.1%} apart in pitch: half a sample of shift"
@@ -102,7 +102,7 @@ def step_halving_ratio(engine_name: str, work_folder: Path) -> float:
 
 
 @dataclass(frozen=True)
-class StageTimeSamples(Sampled):
+class StageTimeSamples(SampledSignal):
     """Faulty held samples: every stage reads the sample at its time, so that the last stage of a step reads the next
     sample."""
 
@@ -116,7 +116,7 @@ def halving_naive_result(work_folder: Path) -> str:
     """Result without the remedy, as text: pitch under a force that is read at the time of each stage."""
     base = vehicle(geometry="linear")
     values = static_forces(base, 251, 2e-3, noise_deviation=500.0).values
-    truth = exact_states(setups.driven_by_forces(base, Sampled(values, 2e-3, True)), 2e-3, 250, values[:250])
+    truth = exact_states(setups.driven_by_forces(base, SampledSignal(values, 2e-3, True)), 2e-3, 250, values[:250])
     forces = StageTimeSamples(values, 2e-3, held=False)
     errors = [
         largest_magnitude(
@@ -172,7 +172,7 @@ def noise_adaptive_naive_result(work_folder: Path) -> str:
     base = vehicle(geometry="linear")
     forces = static_forces(base, 200, 1e-3, noise_deviation=500.0)
     driven = setups.driven_by_forces(base, forces)
-    linear = linearised(driven.vehicle)
+    linear = linearised_matrices(driven.vehicle)
     a, masses, g = first_order(linear), linear[0].diagonal(), base.parameters.g
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
@@ -267,7 +267,7 @@ def passed_waves_ratio(engine_name: str, work_folder: Path) -> float:
     infinite unless the stated error is a warning, and the steps that the warnings name lead to a run without a
     warning."""
     stated_run = run_over_waves(engine_name, 2e-3, with_error=True)
-    name, estimate = max(errors_of(stated_run).items(), key=lambda each: each[1].share)
+    name, estimate = max(error_estimates_of(stated_run).items(), key=lambda each: each[1].share)
     cured: Estimate | None = estimate
     for _ in range(3):
         if cured and cured.warned:

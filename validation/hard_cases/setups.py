@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
-from models.core.signals import Sampled, Signal, Smooth, Stacked
+from models.core.signals import SampledSignal, Signal, Smooth, StackedSignal
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Mode, Settings
 from models.engines.catalogue import RECOMMENDED
 from models.engines.protocol import build
 from models.engines.protocol import build_unchecked as build_unchecked
-from models.engines.stability import first_order, linearised
+from models.engines.stability import first_order, linearised_matrices
 from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases.case import IMPLEMENTATIONS, OutcomeWord
@@ -55,7 +55,7 @@ def guided_vehicle(base_assembly: Assembly, forces: Signal, pitch: Signal) -> As
     consistent."""
     start = base_assembly.initial.copy()
     start[[3, 7]] = pitch.at(0.0)[:2]
-    return replace(base_assembly.without_tyres().with_input("pitch", Stacked((forces, pitch))), initial=start)
+    return replace(base_assembly.without_tyres().with_input("pitch", StackedSignal((forces, pitch))), initial=start)
 
 
 def smooth_pitch(angles: np.ndarray, sample_period: float) -> Smooth:
@@ -70,12 +70,12 @@ def static_forces(
     is_held: bool = True,
     noise_deviation: float = 0.0,
     seed: int = 1,
-) -> Sampled:
+) -> SampledSignal:
     """Wheel forces (sample_count, 2) in N that carry the vehicle, with independent noise of a standard deviation (N) on
     each sample."""
     p, z = base_assembly.parameters, base_assembly.initial
     carried = np.array([p.k1 * z[0], p.k2 * z[1]])
-    return Sampled(
+    return SampledSignal(
         carried + noise_deviation * np.random.default_rng(seed).standard_normal((sample_count, 2)),
         sample_period,
         is_held,
@@ -127,7 +127,7 @@ def exact_states(assembly: Assembly, time_step: float, step_count: int, forces: 
 
     forces (step_count, 2) in N are held over each step; None is the vehicle on the flat road.
     """
-    linear = linearised(assembly.vehicle)
+    linear = linearised_matrices(assembly.vehicle)
     push = np.zeros((step_count, 4))
     push[:, :3] = [body.mass * assembly.vehicle.gravity for body in assembly.vehicle.bodies]
     if forces is not None:
@@ -144,7 +144,7 @@ def exact_states(assembly: Assembly, time_step: float, step_count: int, forces: 
 
 def exact_decay(assembly: Assembly, times: np.ndarray) -> np.ndarray:
     """Exact states (n, 8) of the linearised vehicle on a flat road, at any times (n,) in s."""
-    poles, shapes = np.linalg.eig(first_order(linearised(assembly.vehicle)))
+    poles, shapes = np.linalg.eig(first_order(linearised_matrices(assembly.vehicle)))
     rest_state = vehicle(geometry="linear").initial
     shares = np.linalg.solve(shapes, assembly.initial - rest_state)
     return rest_state + ((np.exp(np.outer(times, poles)) * shares) @ shapes.T).real

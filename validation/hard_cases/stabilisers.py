@@ -11,7 +11,7 @@ from unittest import mock
 import exudyn.itemInterface as items
 import numpy as np
 
-from models.core.signals import Sampled, Smooth, Stacked
+from models.core.signals import SampledSignal, Smooth, StackedSignal
 from models.core.time_series import write_time_series
 from models.core.trajectory import Trajectory
 from models.engines import exudyn as exudyn_engine
@@ -102,7 +102,7 @@ def vehicle_under_held_forces(is_moment_held: bool = False) -> Assembly:
     base = vehicle("asymmetric_twin")
     assembly = driven_by_forces(base, static_forces(base, 126, 4e-3, noise_deviation=300.0))
     samples = 2e3 * np.sin(2 * np.pi * 20.0 * 4e-3 * np.arange(126))[:, None]
-    return replace(assembly, moment=Sampled(samples, 4e-3, is_moment_held))
+    return replace(assembly, moment=SampledSignal(samples, 4e-3, is_moment_held))
 
 
 def moving_moment_error(engine_name: str, work_folder: Path) -> float:
@@ -126,7 +126,7 @@ def moving_moment_naive_result(work_folder: Path) -> str:
 
 def moment_between_steps_error(engine_name: str, work_folder: Path) -> float:
     """Case: a moment sampled every 1.5 ms in a run with steps of 1 ms must be refused. Error: 0 if it is not."""
-    moment = Sampled(np.zeros((400, 1)), 1.5e-3, held=False)
+    moment = SampledSignal(np.zeros((400, 1)), 1.5e-3, held=False)
     run(engine_name, replace(vehicle_under_held_forces(), moment=moment), STEP, DURATION)
     return 0.0
 
@@ -147,7 +147,7 @@ def guided_assembly(noise_deviation: float = 0.0, mass_factor: float = 1.0) -> A
     motion = states[:, 2:4] + noise_deviation * np.random.default_rng(7).standard_normal((len(states), 2))
     base = vehicle("asymmetric_twin")
     forces = static_forces(base, 2, DURATION, is_held=False)
-    signal = Stacked((forces, Smooth(motion, 2.5e-4, derivatives=2, degree=5)))
+    signal = StackedSignal((forces, Smooth(motion, 2.5e-4, derivatives=2, degree=5)))
     assembly = vehicle("asymmetric_twin", start_state=states[0], m3=mass_factor * base.parameters.m3)
     assembly.initial[[2, 3, 6, 7]] = signal.at(0.0)[2:6]
     return assembly.without_tyres().with_input("heave-pitch", signal)

@@ -7,7 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.engines import exudyn as exudyn_engine
 from models.engines import mujoco as mujoco_engine
 from models.engines.exudyn_system import solve
@@ -128,7 +128,7 @@ def vehicle_under_stepped_force():
     base = vehicle(geometry="linear")
     values = static_forces(base, 20, 10e-3).values.copy()
     values[5:, 0] += 1000.0
-    forces = Sampled(values, 10e-3, held=True)
+    forces = SampledSignal(values, 10e-3, held=True)
     return driven_by_forces(base, forces), forces
 
 
@@ -166,7 +166,7 @@ def restart_difference(engine_name: str, work_folder: Path) -> float:
     forces = static_forces(base, 400, 1e-3, noise_deviation=500.0)
     full_states = run(engine_name, driven_by_forces(base, forces), 1e-3, 0.4).states
     second_half = driven_by_forces(
-        replace(base, initial=full_states[200].copy()), Sampled(forces.values[200:], 1e-3, True)
+        replace(base, initial=full_states[200].copy()), SampledSignal(forces.values[200:], 1e-3, True)
     )
     return largest_magnitude(run(engine_name, second_half, 1e-3, 0.2).states - full_states[200:])
 

@@ -15,7 +15,7 @@ from models.measured.faults_of_measurement import SimulatedFaults
 from models.measured.signal import HUB_COMPONENTS, TransducerPlace
 from models.systems.hub_forces.scene import TwoTrackRoadTable
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording_of_samples, virtual_measurement
-from models.vehicles.cut_vehicle import CutVehicle, cut
+from models.vehicles.cut_vehicle import CutVehicle, cut_at_hubs
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
 from validation.spatial.cars import twin
@@ -167,7 +167,7 @@ def _car_variant(variant_name: str) -> CutVehicle:
         "stiff": _suspended_vehicle(full_vehicle, 1.2, 1.0),
         "worn": _suspended_vehicle(full_vehicle, 1.0, 0.7),
     }
-    return cut(vehicles[variant_name], "body")
+    return cut_at_hubs(vehicles[variant_name], "body")
 
 
 def _suspended_vehicle(vehicle: SpatialVehicle, stiffness_factor: float, damping_factor: float) -> SpatialVehicle:

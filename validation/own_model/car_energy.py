@@ -6,7 +6,7 @@ import numpy as np
 from models.engines.spatial_reference import SpatialReference
 from models.multibody.numbers import Handling
 from models.systems.handling.energy import bodies_energy
-from models.vehicles.free_vehicle import rotor
+from models.vehicles.free_vehicle import rotor_name
 from validation.own_model.cars import CORNERS, SALOON
 
 REVERSED_JOINTS = ("rl swing", "rr swing", "rl spin", "rr spin")
@@ -35,7 +35,7 @@ def _coordinate_names() -> dict[str, tuple[str, str]]:
         places[f"{name} {'travel' if front else 'swing'}"] = (
             (f"{name} strut", "z") if front else (f"{name} arm joint 1", "ry")
         )
-        places[f"{name} spin"] = (rotor(name), "ry")
+        places[f"{name} spin"] = (rotor_name(name), "ry")
     return places
 
 

@@ -9,9 +9,9 @@ bodies' means over three directions, of their centres' shifts or of their turns.
 
 import numpy as np
 
-from models.multibody.plain.constraints import turning_rows
+from models.multibody.plain.constraints import angular_velocity_jacobian
 from models.multibody.plain.motion import FIRST_DERIVATIVE
-from models.own_model.builds import Equations, Motion, plain_tree
+from models.own_model.builds import Equations, StateMotion, plain_tree
 from models.own_model.constraints import plain_constraints
 from models.own_model.equalities import coupling_rows
 from models.own_model.reading import TwinModel
@@ -26,12 +26,12 @@ def soft_constraint_equations(twin_model: TwinModel) -> Equations:
     tree, constraints = plain_tree(twin_model), plain_constraints(twin_model)
     give, scale = _row_compliance(twin_model), _row_factors(twin_model)
 
-    def move(q: np.ndarray, v: np.ndarray) -> Motion:
+    def move(q: np.ndarray, v: np.ndarray) -> StateMotion:
         mass, force = tree.mass_and_force(0.0, q, v)
         rows, rest = constraints.terms(q, v)
         rows, rest = scale[:, None] * rows, scale * rest
         acceleration = np.linalg.solve(mass + rows.T / give @ rows, force - rows.T / give @ rest)
-        return Motion(mass, mass @ acceleration, acceleration)
+        return StateMotion(mass, mass @ acceleration, acceleration)
 
     return move
 
@@ -69,6 +69,8 @@ def _mean_inverse_inertia(twin_model: TwinModel, inverse_mass: np.ndarray, conne
     motion = bodies.move(*np.zeros((2, twin_model.size)))
     for name in (name for name, _ in connected_bodies if name is not None):
         (shift,) = motion.at(bodies.points([(name, bodies.position[name])]))
-        for i, rows in enumerate((shift[FIRST_DERIVATIVE:].T, turning_rows(motion.axes(bodies.row[name])))):
+        for i, rows in enumerate(
+            (shift[FIRST_DERIVATIVE:].T, angular_velocity_jacobian(motion.axes(bodies.row[name])))
+        ):
             total[i] += np.trace(rows @ inverse_mass @ rows.T) / 3.0
     return total

@@ -15,7 +15,7 @@ from numba import carray, cfunc, types
 from models.engines import mujoco as adapter
 from models.engines.assembly import Assembly, Settings
 from models.engines.mujoco_layout import offsets
-from models.engines.mujoco_quiet import installed
+from models.engines.mujoco_quiet import installed_callback
 from models.machine.stack import array_at, double_at
 
 HEADER_LENGTH = 17
@@ -75,7 +75,7 @@ class CompiledForces:
     def run(self) -> np.ndarray:
         """States (n + 1, 8) of a run with the forces, without the checks of an engine: for comparison and timing
         only."""
-        with installed(force_callback()):
+        with installed_callback(force_callback()):
             return self.run_with_installed_callback()
 
     def run_with_installed_callback(self) -> np.ndarray:

@@ -18,7 +18,7 @@ import numpy as np
 
 from models.engines import spatial_exudyn_build
 from models.engines.assembly import Settings
-from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.free_vehicle import FreeModel, LoadedVehicle, free_model
 from models.engines.protocol import build as in_plane
 from models.engines.spatial_protocol import INTEGRATORS
 from models.engines.spatial_protocol import build as in_space
@@ -33,11 +33,11 @@ from models.multibody.cut_kernel import (
     set_joint_forces,
     table_views,
 )
-from models.multibody.cut_table import HubInputs, table
+from models.multibody.cut_table import HubInputs, cut_vehicle_table
 from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as pitch_plane_scene
-from models.vehicles.cut_vehicle import CutVehicle, Element
-from models.vehicles.description import Vehicle
+from models.vehicles.cut_vehicle import CutVehicle, CutVehicleElement
+from models.vehicles.description import PlaneVehicle
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre, Vector
 from models.vehicles.vehicle_file import load_vehicle
 
@@ -88,7 +88,7 @@ def pitch_plane_builds(engine: str) -> TwoBuilds:
     return TwoBuilds(in_plane(engine, assembly, settings), free, -1.0)
 
 
-def _vehicle_in_space(pitch_plane_vehicle: Vehicle) -> SpatialVehicle:
+def _vehicle_in_space(pitch_plane_vehicle: PlaneVehicle) -> SpatialVehicle:
     """Description in space of a pitch-plane vehicle."""
     bodies = tuple(
         Body(body.name, body.mass, (0.0, 0.0, 0.0), ("z",))
@@ -119,11 +119,11 @@ def _vehicle_in_space(pitch_plane_vehicle: Vehicle) -> SpatialVehicle:
     return SpatialVehicle("pitch plane", bodies, springs, tyres, (0.0,))
 
 
-def driven_vehicle(vehicle: SpatialVehicle, gravity: float = 0.0) -> Driven:
+def driven_vehicle(vehicle: SpatialVehicle, gravity: float = 0.0) -> LoadedVehicle:
     """A vehicle on a flat road with its compiled forces, as the builder of free vehicles takes it."""
     tree = replace(vehicle, springs=(), bars=(), tyres=(), side_forces=(), drags=(), outputs=())
     numbers = _force_table(tree, vehicle)
-    return Driven(tree, np.array([0.0, 0.0, -gravity]), numbers, joint_forces, set_joint_forces)
+    return LoadedVehicle(tree, np.array([0.0, 0.0, -gravity]), numbers, joint_forces, set_joint_forces)
 
 
 def _force_table(tree_vehicle: SpatialVehicle, force_vehicle: SpatialVehicle) -> np.ndarray:
@@ -134,7 +134,7 @@ def _force_table(tree_vehicle: SpatialVehicle, force_vehicle: SpatialVehicle) ->
     ]
     tyres = [_spring_element(t.name, t.body, t.body, t, t.point, t.point, UPWARD) for t in force_vehicle.tyres]
     cut_vehicle = CutVehicle(force_vehicle.bodies[0].name, tree_vehicle, tree_vehicle, (*springs, *tyres), np.zeros(0))
-    numbers = table(cut_vehicle, HubInputs(np.zeros((3, 0))), STEP)
+    numbers = cut_vehicle_table(cut_vehicle, HubInputs(np.zeros((3, 0))), STEP)
     rows, numbers[CHASSIS] = table_views(numbers)[3], -1.0
     rows[:, AXIS_JOINT] = -1.0
     for row, tyre in zip(rows[len(springs) :], force_vehicle.tyres, strict=True):
@@ -150,9 +150,9 @@ def _spring_element(
     start_point: Vector,
     end_point: Vector,
     axis: Vector,
-) -> Element:
+) -> CutVehicleElement:
     vectors = (np.array(start_point, float), np.array(end_point, float), np.array(axis, float))
-    return Element(
+    return CutVehicleElement(
         element_name,
         first_body,
         second_body,

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
-from models.machine.timing import describe, interleave, median, paired_ratio
+from models.machine.timing import bootstrap_median, interleave, paired_ratio, timing_statistics
 from models.systems.pitch_plane.scene import assembly_of_scene
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.price.compiled_forces import CompiledForces
@@ -39,7 +39,7 @@ def callback_cost(
         "all compiled to no forces": paired_ratio(seconds[4], seconds[3]),
         "callbacks": [model.plan()["callbacks"] for model in models],
         "seconds": {
-            name: describe(seconds_of_variant) for name, seconds_of_variant in zip(names, seconds, strict=True)
+            name: timing_statistics(seconds_of_variant) for name, seconds_of_variant in zip(names, seconds, strict=True)
         },
         "to no forces": paired_ratio(seconds[2], seconds[0]),
         "to no callback": paired_ratio(seconds[2], seconds[1]),
@@ -62,7 +62,7 @@ def real_time_factors(
     )
     known = (run > table).all()  # else the machine's other work is larger than what is told
     return {
-        "with table": median(duration / run),
-        "without table": median(duration / (run - table)) if known else None,
-        "seconds": describe(run),
+        "with table": bootstrap_median(duration / run),
+        "without table": bootstrap_median(duration / (run - table)) if known else None,
+        "seconds": timing_statistics(run),
     }

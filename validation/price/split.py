@@ -13,16 +13,16 @@ from numba import carray
 
 from models.drawing.figures import LABELS
 from models.engines.assembly import Settings
-from models.engines.contact_bridge import Wheels, forces
-from models.engines.contact_bridge_exudyn import Forces, Rolling, list_forces
-from models.engines.contact_bridge_mujoco import empty_law, model
+from models.engines.contact_bridge import RailWheels, forces
+from models.engines.contact_bridge_exudyn import RailWheelSystem, WheelForceFunctions, list_forces
+from models.engines.contact_bridge_mujoco import empty_law, rail_wheel_model
 from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_march import Marcher
-from models.engines.mujoco_quiet import installed
-from models.engines.reference import derivative_of
+from models.engines.mujoco_quiet import installed_callback
+from models.engines.reference import compiled_derivative
 from models.machine.compiled import njit
 from models.machine.stack import at, beyond
-from models.machine.timing import interleave, median
+from models.machine.timing import bootstrap_median, interleave
 from models.systems.pitch_plane.scene import assembly_of_scene
 from validation.common.rows import Observed, Row, Saved, System, Table
 from validation.price.compiled_forces import CompiledForces, force_callback
@@ -76,7 +76,7 @@ def _road_runs_in_exudyn() -> Runs:
     assembly = assembly_of_scene(road_excited.scene())
     p, y, road = assembly.parameters.array(), np.empty(8), np.zeros(4)
     masses = [assembly.parameters.m1, assembly.parameters.m2, assembly.parameters.m3, assembly.parameters.I]
-    derivative, scale = derivative_of("road", assembly.vehicle.geometry), np.array(masses)
+    derivative, scale = compiled_derivative("road", assembly.vehicle.geometry), np.array(masses)
 
     def forces_of(positions: Any, rates: Any) -> list[float]:
         y[:4], y[4:] = positions, rates
@@ -100,26 +100,30 @@ def _road_runs_in_mujoco() -> Runs:
 def _wheel_runs_in_exudyn() -> Runs:
     wheels, steps, step = _wheels_steps_and_step()
     return [
-        partial(Rolling(wheels, force_function).run, *wheels.state(), steps, step, METHODS["exudyn"])
-        for force_function in (zero_forces, list_forces(4, np.zeros(0), weak_damper_in_block), Forces(wheels).of)
+        partial(RailWheelSystem(wheels, force_function).run, *wheels.state(), steps, step, METHODS["exudyn"])
+        for force_function in (
+            zero_forces,
+            list_forces(4, np.zeros(0), weak_damper_in_block),
+            WheelForceFunctions(wheels).of,
+        )
     ]
 
 
 def _wheel_runs_in_mujoco() -> Runs:
     wheels, steps, step = _wheels_steps_and_step()
-    marcher, start = Marcher(model(wheels, step, METHODS["mujoco"])), np.concatenate(wheels.state())[None]
+    marcher, start = Marcher(rail_wheel_model(wheels, step, METHODS["mujoco"])), np.concatenate(wheels.state())[None]
     return [
         partial(_run_with_callback, law, partial(marcher.run, start, steps))
         for law in (empty_law(), kernel_law(add_weak_damper), kernel_law(forces))
     ]
 
 
-def _wheels_steps_and_step() -> tuple[Wheels, int, float]:
-    return Wheels(1, cells=wheelset.CONTACT_CELLS, speed=20.0), STEPS["wheel-20"], STEP["wheel-20"]
+def _wheels_steps_and_step() -> tuple[RailWheels, int, float]:
+    return RailWheels(1, cells=wheelset.CONTACT_CELLS, speed=20.0), STEPS["wheel-20"], STEP["wheel-20"]
 
 
 def _run_with_callback(force_callback: Any, run_model: Callable[[], Any]) -> None:
-    with installed(force_callback):
+    with installed_callback(force_callback):
         run_model()
 
 
@@ -155,7 +159,7 @@ def bridge_share(timed_march: Saved) -> tuple[float, float, float]:
     """Share of the bridge between engine and forces in the time of a step, in %, with its 95 % interval (share, low,
     high)."""
     empty, cheap, real = (np.array(timed_march["seconds"][run]) for run in FORCE_VARIANTS)
-    return median(100.0 * (cheap - empty) / real)
+    return bootstrap_median(100.0 * (cheap - empty) / real)
 
 
 def rows(case_data: list[Saved]) -> list[Row]:

@@ -10,7 +10,7 @@ from models.advice.price import runner
 from models.advice.price.curves import RESOLVED_ERROR_FACTOR, ToleranceCost
 from models.advice.price.runner import CostsAtTolerance, LossByDefault, WorkPrecisionPoint, WorkPrecisionPoints
 from models.drawing.figures import LABELS
-from models.machine.timing import describe
+from models.machine.timing import timing_statistics
 from validation.common.rows import Table
 
 STATUS_WORDS = {"ok": "fine", "raised": "raised", "refused": "refused", "flagged": "flagged", "SILENT": "silent"}
@@ -69,7 +69,9 @@ def rounds_sentence(timed_points: list[WorkPrecisionPoint]) -> str:
     )
     if not in_rounds:
         return "Seconds are those of one run each."
-    spread = float(np.median([statistics["mad"] / statistics["median"] for statistics in map(describe, in_rounds)]))
+    spread = float(
+        np.median([statistics["mad"] / statistics["median"] for statistics in map(timing_statistics, in_rounds)])
+    )
     return (
         f"Seconds are medians of {rounds_text} settings whose seconds decide something (fewer where a run is "
         "longer than "

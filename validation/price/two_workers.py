@@ -25,7 +25,7 @@ import numpy as np
 
 from models.ensemble.runner import PathBlocks, run_paths
 from models.ensemble.workers import dask_workers, process_pool
-from models.machine.timing import interleave, median, paired_ratio
+from models.machine.timing import bootstrap_median, interleave, paired_ratio
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.virtual_measurement import write_measurement
@@ -118,7 +118,7 @@ def measured_pools(round_count: int = TIMING_ROUNDS, noise_ensemble: Any = None)
         return {
             name: {
                 "efficiency": paired_ratio(seconds[0], took),
-                "seconds": median(took),
+                "seconds": bootstrap_median(took),
                 "cost": cost_of_blocks(pools[name]),
             }
             for name, took in zip(pools, seconds[1:], strict=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import expm
 
-from models.core.scene_file import parse
+from models.core.scene_file import parse_toml
 from models.ride.closed_forms import QuarterCar
 from models.ride.covariance import stationary_covariance
 from models.ride.excited import DelayedSystem, vehicle_with_road
@@ -93,7 +93,7 @@ def single_body(mass: float, stiffness: float, damping: float) -> SpatialVehicle
 @cache
 def roll_steered_vehicle() -> SpatialVehicle:
     """The vehicle R19-free with roll steer at the front axle; outputs: heading and lateral position."""
-    table = parse(SHIPPED_FOLDER / "r19_free.toml")
+    table = parse_toml(SHIPPED_FOLDER / "r19_free.toml")
     table["axles"][0]["roll_steer"] = 0.05
     vehicle = build_vehicle(table, "steered")
     outputs = (

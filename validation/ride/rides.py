@@ -22,7 +22,7 @@ from models.road.two_track import (
     road_of_level,
     wheels_on_track,
 )
-from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
+from models.vehicles.linear_vehicle import LinearOutput, LinearVehicle, WheelPosition
 from models.vehicles.spatial import SpatialVehicle
 
 ROAD_INTENSITY = 1e-4
@@ -142,12 +142,12 @@ def quarter_car_vehicle(
     unit, no, no_heights, first = np.eye(n), np.zeros(n), np.zeros(w), np.eye(w)[0]
     k_t, c_t = R[b, 0], S[b, 0]
     outputs = (
-        Output("body", "m/s2", "acceleration", unit[0], no, no, no_heights, no_heights),
-        Output("travel", "m", "travel", no, no, unit[0] - unit[b], no_heights, no_heights),
-        Output("tyre", "m", "deflection", no, no, unit[b], -first, no_heights),
-        Output("height", "m", "displacement", no, no, unit[0], no_heights, no_heights),
-        Output("load", "N", "force", no, -c_t * unit[b], -k_t * unit[b], k_t * first, c_t * first),
-        Output("wheel", "m/s2", "acceleration", unit[b], no, no, no_heights, no_heights),
+        LinearOutput("body", "m/s2", "acceleration", unit[0], no, no, no_heights, no_heights),
+        LinearOutput("travel", "m", "travel", no, no, unit[0] - unit[b], no_heights, no_heights),
+        LinearOutput("tyre", "m", "deflection", no, no, unit[b], -first, no_heights),
+        LinearOutput("height", "m", "displacement", no, no, unit[0], no_heights, no_heights),
+        LinearOutput("load", "N", "force", no, -c_t * unit[b], -k_t * unit[b], k_t * first, c_t * first),
+        LinearOutput("wheel", "m/s2", "acceleration", unit[b], no, no, no_heights, no_heights),
     )
     wheels = tuple(WheelPosition(f"wheel {i}", x, 0.0, i) for i, (x, _) in enumerate(quarter_cars_at_axles))
     return LinearVehicle(M, D, K, R, S, tuple(("body", str(i)) for i in range(n)), wheels, outputs)

@@ -14,7 +14,7 @@ from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import HubInputs
 from models.multibody.numbers import Handling
 from models.tyre.bristles import brush_forces
-from models.vehicles.cut_vehicle import CutVehicle, cut
+from models.vehicles.cut_vehicle import CutVehicle, cut_at_hubs
 from models.vehicles.spatial import Curve, SpatialVehicle, SpringDamper
 from models.vehicles.vehicle_file import load_vehicle
 
@@ -25,7 +25,7 @@ SEED = 31
 @cache
 def r19() -> CutVehicle:
     """The shipped car R19-free, cut at its wheels."""
-    return cut(load_vehicle("r19_free"), "body")
+    return cut_at_hubs(load_vehicle("r19_free"), "body")
 
 
 def twin() -> SpatialVehicle:
@@ -62,7 +62,7 @@ def rough_car() -> CutVehicle:
     )
     springs = [replace(s, **law_sets[i % 4]) for i, s in enumerate(full_vehicle.springs)]
     springs[-1] = replace(springs[-1], stiffness=0.0, travel_force=seat)
-    return cut(replace(full_vehicle, bodies=bodies, springs=(*springs, lateral)), "body")
+    return cut_at_hubs(replace(full_vehicle, bodies=bodies, springs=(*springs, lateral)), "body")
 
 
 def static_forces(vehicle: CutVehicle, row_count: int, force_frame: str = "hub") -> HubInputs:

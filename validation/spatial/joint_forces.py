@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from models.engines.mujoco_quiet import without_warnings
-from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
+from models.engines.mujoco_tree import MujocoIndices, mujoco_specification, set_masses
 from models.systems.measured.sections import guided_bodies
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.spatial import FREEDOMS
@@ -83,7 +83,7 @@ class _LoadedModel:
     bodies."""
 
     def __init__(self, vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, hub_wrenches: np.ndarray) -> None:
-        self.vehicle, spec = vehicle, spec_of(vehicle.tree, 1e-3)
+        self.vehicle, spec = vehicle, mujoco_specification(vehicle.tree, 1e-3)
         names = {body.name: str(i) for i, body in enumerate(vehicle.tree.bodies)}
         for number in (names[name] for name in guided_bodies(vehicle)):
             spec.body(number).add_site(name=number)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.multibody import forces as at
-from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
+from models.multibody.numbers import GRAVITY, Controls, Handling, TyreParameters
 from models.systems.handling.run import SimulatedDrive, drive_run
 from models.systems.handling.single_track import steady_turn_gains
 from models.vehicles.spatial import SpatialVehicle, hitch_of
@@ -93,7 +93,7 @@ def circle_error(steer: float = 0.15, speed: float = 3.0) -> float:
     A rear axle at a wheelbase L behind one that is steered by delta rolls on a circle of R = L / tan(delta); the ball,
     e behind it, on one of sqrt(R^2 + e^2), and the caravan's axle, l behind the ball, touches its own circle.
     """
-    car = Handling(replace(caravan(), drags=()), Tyres(), Controls(steer=((0.0, 0.0), (2.0, steer))))
+    car = Handling(replace(caravan(), drags=()), TyreParameters(), Controls(steer=((0.0, 0.0), (2.0, steer))))
     front, rear, axle = car.given.axles
     hitch = car.vehicle.body(hitch_of(car.vehicle.towed[0])).position[0]
     radius, back, bar = (front - rear) / math.tan(steer), rear - hitch, hitch - axle

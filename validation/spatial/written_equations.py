@@ -14,8 +14,8 @@ from models.engines.cut_vehicle import PLAIN_ENGINE
 from models.engines.cut_vehicle import build as hub_model
 from models.multibody import forces as at
 from models.multibody.cut_table import HubInputs
-from models.multibody.numbers import Controls, Handling, Push, Tyres
-from models.multibody.plain.bristles import Patch
+from models.multibody.numbers import Controls, ExternalPush, Handling, TyreParameters
+from models.multibody.plain.bristles import TyrePatches
 from models.multibody.plain.bristles import tyre_forces as plain_tyre_forces
 from models.multibody.plain.rolling import PlainRolling
 from models.road.iso8608 import iso8608_road
@@ -23,7 +23,7 @@ from models.road.plane_waves import plane_waves
 from models.systems.handling.run import REFERENCE_ENGINE, build_in_engine
 from models.systems.hub_forces.measurement import HubForces, road_under_wheels
 from models.tyre.bristles import brush_forces
-from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, cut
+from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, cut_at_hubs
 from models.vehicles.spatial import Curve, SpatialVehicle, hitch_of
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.checks import largest_relative_difference
@@ -58,15 +58,17 @@ def rolling_cars() -> dict[str, Handling]:
     """Test cars by name, steered, braked and driven on a rough road: as shipped, asymmetric, with nonlinear springs,
     with a caravan, and with a trailer; two are on a slope and pushed by a gust."""
     waves, r19 = plane_waves(4e-6, seed=3), load_vehicle("r19_free")
-    gust = Push("body", (0.3, 0.1, 1.0), (0.1, 1.0, 0.2), ((0.0, 0.0), (0.4, 500.0)))
+    gust = ExternalPush("body", (0.3, 0.1, 1.0), (0.1, 1.0, 0.2), ((0.0, 0.0), (0.4, 500.0)))
     return {
-        "r19_free": Handling(r19, Tyres(), TURN_CONTROLS, waves),
+        "r19_free": Handling(r19, TyreParameters(), TURN_CONTROLS, waves),
         "twin": Handling(
-            twin(), Tyres(inclination=-0.03, fixed=("fl", "rr"), cells=11), TURN_CONTROLS, waves, 0.05, (gust,)
+            twin(), TyreParameters(inclination=-0.03, fixed=("fl", "rr"), cells=11), TURN_CONTROLS, waves, 0.05, (gust,)
         ),
-        "curved": Handling(nonlinear_spring_car(), Tyres(spin_inertia=1.2), TURN_CONTROLS, waves),
-        "caravan": Handling(caravan(), Tyres(inclination=0.02), TURN_CONTROLS, waves),
-        "train": Handling(train(), Tyres(fixed=("fl", "dr", "bl"), cells=11), TURN_CONTROLS, waves, 0.05, (gust,)),
+        "curved": Handling(nonlinear_spring_car(), TyreParameters(spin_inertia=1.2), TURN_CONTROLS, waves),
+        "caravan": Handling(caravan(), TyreParameters(inclination=0.02), TURN_CONTROLS, waves),
+        "train": Handling(
+            train(), TyreParameters(fixed=("fl", "dr", "bl"), cells=11), TURN_CONTROLS, waves, 0.05, (gust,)
+        ),
     }
 
 
@@ -108,7 +110,7 @@ def report_difference(car: Handling, state_count: int) -> float:
     states = list(rolling_states(car, state_count))
     state_times, q, v = (np.array(column) for column in zip(*states, strict=True))
     tyres, ledgers = np.empty((state_count, len(car.vehicle.tyres), at.REPORTED)), np.empty((state_count, at.LEDGER))
-    at.reports(numbers, state_times, q, v, tyres, ledgers)
+    at.fill_reports(numbers, state_times, q, v, tyres, ledgers)
     for ours, theirs in zip((tyres, ledgers), plain.report(state_times, q, v), strict=True):
         shape = -1, ours.shape[-1]
         gap, size = np.abs(ours - theirs).reshape(shape).max(0), np.abs(theirs).reshape(shape).max(0)
@@ -127,7 +129,10 @@ def rolling_path_difference(car: Handling, engine: str, duration: float) -> floa
 
 def cut_cars() -> dict[str, CutVehicle]:
     """Cars cut at their wheels, by name: as shipped, and asymmetric with tyres that can lift off."""
-    return {"r19_free": cut(load_vehicle("r19_free"), "body"), "twin": cut(twin().with_tyres(pushes_only=True), "body")}
+    return {
+        "r19_free": cut_at_hubs(load_vehicle("r19_free"), "body"),
+        "twin": cut_at_hubs(twin().with_tyres(pushes_only=True), "body"),
+    }
 
 
 def hub_input_sets(vehicle: CutVehicle) -> list[HubInputs]:
@@ -205,7 +210,7 @@ def brush_force_difference(state_count: int) -> float:
         slides = rng.normal(0.0, 1.0, (8, 4)) * 10.0 ** rng.uniform(-4.0, 1.0, (8, 1))
         slides[:, 3] = rng.uniform(1.0, 40.0, 8) if i % 2 else rng.uniform(-0.3, 0.3, 8)
         ones = np.ones(len(slides))
-        patch = Patch(half * ones, width * ones, load * ones, mu * ones, stiffness * ones)
+        patch = TyrePatches(half * ones, width * ones, load * ones, mu * ones, stiffness * ones)
         gap = plain_tyre_forces(patch, slides, cells) - brush_forces(load, mu, half, width, stiffness, slides, cells)
         worst = max(worst, float(np.abs(gap / (load * np.array([1.0, 1.0, width]))).max()))
     return worst

@@ -13,12 +13,12 @@ from types import ModuleType
 from typing import Any
 
 from models.advice.choice.answer import RunQuantities
-from models.core.assumptions import BrokenAssumption, collected_breaches, result_observer
+from models.core.assumptions import BrokenAssumption, collected_broken_assumptions, result_observer
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
 from models.core.scene_effects import (
     absent_effects,
-    module_of,
+    effect_of,
     named_effects,
     rebuilt_scene,
     scene_without,
@@ -107,7 +107,7 @@ class Variants:
     def sentence_on_effect(self, effect_name: str) -> str:
         """Sentence that describes an effect, or what leaving it out means."""
         sentences = self.scene.effect_sentences if self._knows_effects else {}
-        return str(sentences.get(effect_name) or module_of(self.scene.system, effect_name).__doc__ or "").partition(
+        return str(sentences.get(effect_name) or effect_of(self.scene.system, effect_name).__doc__ or "").partition(
             "\n"
         )[0]
 
@@ -138,7 +138,7 @@ class Variants:
         """Run a variant, even if it was run before; returns its quantities, None where the run fails, and the
         assumptions that it breaks.
         """
-        with collected_breaches() as broken:
+        with collected_broken_assumptions() as broken:
             return self._run(*variant_key), broken
 
     def _run(self, omitted_effects: EffectSet, step_factor: int) -> RunQuantities | None:

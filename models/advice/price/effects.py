@@ -20,9 +20,9 @@ from models.advice.choice.answer import (
     sampled_change_and_error,
 )
 from models.advice.choice.variants import Variants, module_of_system
-from models.core.assumptions import collected_breaches
+from models.core.assumptions import collected_broken_assumptions
 from models.core.errors import InputError, RunFailed
-from models.machine.timing import describe, paired_ratio
+from models.machine.timing import paired_ratio, timing_statistics
 from models.systems.ride.of_scene import needs_run_in_time
 
 PRICED_STEP_LIMIT = 960
@@ -100,7 +100,7 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
     complete = Variants(scene, engine)
     variants = complete.window(PRICED_STEP_LIMIT)
     short, names = variants.scene, (*variants.effects, *variants.absent_effect_names)
-    with collected_breaches() as broken_alone:
+    with collected_broken_assumptions() as broken_alone:
         base: RunQuantities = system.computed_quantities(short, engine)
     runs: dict[str, Callable[[], RunQuantities]] = {"": partial(system.computed_quantities, short, engine)}
     first, whys, keeps = {"": base}, dict[str, str](), dict[str, tuple[str, ...]]()
@@ -111,7 +111,7 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
                 if name in variants.effects
                 else variants.scene_with_effect(name)
             )
-            with collected_breaches() as breaches:
+            with collected_broken_assumptions() as breaches:
                 first[name], runs[name] = (
                     system.computed_quantities(changed_scene, engine),
                     partial(system.computed_quantities, changed_scene, engine),
@@ -156,7 +156,7 @@ def _microseconds_by_turn(run_functions: dict[str, Callable[[], RunQuantities]])
 
 def median_and_deviation(samples: np.ndarray) -> tuple[float, float]:
     """Median and median absolute deviation of ``samples`` (n,), in their unit."""
-    statistics = describe(samples.tolist())
+    statistics = timing_statistics(samples.tolist())
     return statistics["median"], statistics["mad"]
 
 

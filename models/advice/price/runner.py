@@ -25,9 +25,9 @@ from models.advice.price.curves import (
     pareto_front,
 )
 from models.advice.price.problem import Setting, WorkPrecisionProblem
-from models.core.assumptions import collected_breaches
+from models.core.assumptions import collected_broken_assumptions
 from models.core.errors import InputError, RunFailed
-from models.machine.timing import interleave, interval, resamples
+from models.machine.timing import bootstrap_interval, bootstrap_rounds, interleave
 
 PointStatus = Literal["ok", "raised", "refused", "flagged", "SILENT"]
 CostsAtTolerance = dict[str, ToleranceCost]
@@ -228,7 +228,7 @@ class WorkPrecisionPoints:
             if rounds < FEWEST_TIMING_ROUNDS:
                 return LossByDefault(factor, math.nan, math.nan, usual.origin)
             sides = [self._bootstrapped_seconds(side, target_error, rounds) for side in pair]
-            factor, low, high = interval(sides[0] / sides[1])
+            factor, low, high = bootstrap_interval(sides[0] / sides[1])
         return LossByDefault(factor, low, high, usual.origin)
 
     def _bootstrapped_seconds(
@@ -239,7 +239,7 @@ class WorkPrecisionPoints:
         """
         timed_rounds = [np.array(p.seconds)[:: len(p.seconds) // round_count][:round_count] for p in bracket]
         medians = np.array(
-            [np.median(seconds[resamples(round_count, BOOTSTRAP_DRAWS)], axis=1) for seconds in timed_rounds]
+            [np.median(seconds[bootstrap_rounds(round_count, BOOTSTRAP_DRAWS)], axis=1) for seconds in timed_rounds]
         )
         cheapest_reaches = [self._cost_at_tolerance(bracket, target_error, costs) for costs in medians.T]
         return np.array([cheapest.cost for cheapest in cheapest_reaches if cheapest is not None])
@@ -298,7 +298,7 @@ def attempt(priced_problem: WorkPrecisionProblem, setting: Setting) -> WorkPreci
     """
     start_time = PROCESSOR_CLOCK()
     try:
-        with collected_breaches() as broken:
+        with collected_broken_assumptions() as broken:
             solution = priced_problem.build(setting).run()
             seconds, errors = PROCESSOR_CLOCK() - start_time, priced_problem.errors(solution)
     except InputError as error:

@@ -12,7 +12,7 @@ from models.advice.price import PricedScene, SettingLadder
 from models.advice.price.problem import Setting
 from models.advice.price.runner import PointStatus
 from models.advice.price.truth import ReferenceSolution
-from models.core.assumptions import collected_breaches
+from models.core.assumptions import collected_broken_assumptions
 from models.core.errors import InputError, RunFailed
 
 FIRST_TRIED_STEP = 2e-3
@@ -80,7 +80,7 @@ class SettingSearch:
         """Run the scene with a setting and record the outcome, which is returned."""
         start_time = time.process_time()
         try:
-            with collected_breaches() as broken:
+            with collected_broken_assumptions() as broken:
                 solution = self.scene.solve(setting, self.duration)
                 seconds, answer = time.process_time() - start_time, self.scene.priced_run(solution)
         except InputError as error:

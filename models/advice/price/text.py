@@ -8,7 +8,7 @@ from models.advice.price.problem import Setting
 from models.advice.price.recommendation import CheapestChoices, Recommendation, SettingChoice
 from models.advice.price.search import TriedSetting
 from models.drawing.figures import LABELS
-from models.machine.seconds import cost
+from models.machine.seconds import seconds_text
 
 EQUAL_RATIO_MARGIN = 0.005
 """Distance of a cost ratio from 1 up to which it is not reported."""
@@ -50,7 +50,7 @@ def _cheapest_settings_table(recommendation: Recommendation) -> list[str]:
         winner_text = f"{LABELS[engine] if engine else 'all'}, by {kinds}"
         rows.append(
             f"  {winner_text:<24}{_setting_text(choice.tried.setting, not engine):<36}{choice.error:>9.2g} {unit}"
-            f"{choice.calls:>16,.0f}   {cost(choice.rounds or (choice.seconds,))}"
+            f"{choice.calls:>16,.0f}   {seconds_text(choice.rounds or (choice.seconds,))}"
         )
     duration_text = (
         " over the whole run"

@@ -13,7 +13,7 @@ import numpy as np
 
 from models.advice.price import PricedRun, PricedScene, SettingLadder
 from models.advice.price.problem import Setting
-from models.core.assumptions import BrokenAssumption, collected_breaches
+from models.core.assumptions import BrokenAssumption, collected_broken_assumptions
 from models.core.errors import InputError, RunFailed
 from models.ensemble.runner import block_results
 
@@ -147,7 +147,7 @@ class _RungOutcome(NamedTuple):
 def _reference_on_rung(scene: PricedScene, duration: float, setting: Setting) -> _RungOutcome:
     """Run the reference with one setting over ``duration`` (s); a failure is part of the outcome."""
     start_time = time.process_time()
-    with collected_breaches() as broken:
+    with collected_broken_assumptions() as broken:
         try:
             run = scene.priced_run(scene.solve(setting, duration))
         except (InputError, RunFailed) as error:

@@ -24,7 +24,7 @@ from models.systems.ride.of_scene import has_no_linear_equivalent
 from models.systems.ride.omissions import effects_of, wheels_of
 from models.systems.ride.reduced_scene import OmissibleEffect, ReducedScene, refusal_reason
 from models.systems.ride.reduced_scene import reduced_without as without_effects
-from models.vehicles.linear_vehicle import Output
+from models.vehicles.linear_vehicle import LinearOutput
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper
 
 FEWEST_COPIES = 12
@@ -146,7 +146,7 @@ class CopiesInTime:
         )
         return np.ascontiguousarray(roads[:: self.step_factor])
 
-    def mean_squares(self, copy_steps: CopySteps, roads: np.ndarray) -> tuple[tuple[Output, ...], np.ndarray]:
+    def mean_squares(self, copy_steps: CopySteps, roads: np.ndarray) -> tuple[tuple[LinearOutput, ...], np.ndarray]:
         """Outputs of the vehicle, and for each copy their mean squares (copies, p) about the mean of all copies."""
         step = 2.0 * copy_steps.half * self.step_factor
         march = CopiesMarch(self.vehicle(copy_steps), copy_steps.speed, step, self.samples.copies)

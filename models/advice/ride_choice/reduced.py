@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 
 from models.advice.ride_choice.modes import Modes, modes_of, modes_with_road, modes_with_weightings, stable_step
 from models.core.errors import InputError
-from models.core.scene_effects import tables_of
+from models.core.scene_effects import effect_tables_of
 from models.ride.covariance import noise_intensity_of_system
 from models.ride.excited import DelayedSystem, VehicleStateForm, first_order_system, vehicle_states
 from models.ride.weighting import system_with_weightings
@@ -128,7 +128,7 @@ class Roads:
         add to the road.
         """
         ride = scene.ride_scene
-        return self._numbers.index_of(ride, lambda: (ride.road, *tables_of(ride)))
+        return self._numbers.index_of(ride, lambda: (ride.road, *effect_tables_of(ride)))
 
     def excitation_of(self, scene: ReducedScene) -> RoadExcitation:
         """The road excitation of a reduced scene, computed when it is first requested."""

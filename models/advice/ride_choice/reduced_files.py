@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from models.core.scene_effects import table_without_defaults
-from models.core.scene_file import parse
+from models.core.scene_file import parse_toml
 from models.systems.ride.of_scene import CLOSED_FORM_STUDY
 from models.systems.ride.reduced_scene import ReducedScene
 from models.vehicles.vehicle_file import vehicle_path
@@ -19,7 +19,7 @@ def write(reduced_scene: ReducedScene, output_folder: Path) -> Path:
     """Write the reduced scene and its vehicle into a folder; returns the path of the scene file."""
     scene = table_without_defaults(reduced_scene.ride_scene)
     vehicle_file = scene["vehicle"]["file"]
-    vehicle = reduced_tables(parse(vehicle_path(vehicle_file, reduced_scene.ride_scene.folder)), reduced_scene)
+    vehicle = reduced_tables(parse_toml(vehicle_path(vehicle_file, reduced_scene.ride_scene.folder)), reduced_scene)
     origin = f"Reduced by a choice of effects; the whole vehicle is {vehicle_file}."
     notes = f"{vehicle.get('notes', '').strip()}\n{origin}".strip()
     with (output_folder / VEHICLE_FILE_NAME).open("x") as file:

@@ -7,7 +7,7 @@ would be needed to look at it.
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 
-from models.core.finding import Finding, Weight
+from models.core.finding import Finding, FindingWeight
 from models.measured.checks import clipped, drift, faults, gaps, gravity, noise, rigid, spikes, swapped, turning, weight
 from models.measured.checks.evidence import CheckedRecording
 from models.measured.recording import Recording
@@ -43,7 +43,7 @@ SUBJECTS_OF_CHECK = defaultdict(
     },
 )
 """Subjects of a check's findings; two findings on the same subject of the same channel state the same fault."""
-WEIGHT_ORDER: tuple[Weight, ...] = ("error", "doubt", "note")
+WEIGHT_ORDER: tuple[FindingWeight, ...] = ("error", "doubt", "note")
 """Severities of findings, the worst first."""
 
 

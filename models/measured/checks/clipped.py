@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.core.finding import Finding, Weight
+from models.core.finding import Finding, FindingWeight
 from models.measured.checks.evidence import CheckedRecording
 from models.measured.gaps import LONGEST_BRIDGED_GAP, true_runs
 from models.measured.signal import UNIT_OF_QUANTITY, MeasuredSignal
@@ -117,5 +117,5 @@ def _stuck_findings(signal: MeasuredSignal, samples: np.ndarray, sampling_period
         f"{signal.name} stands still at {held} for {end - first:.4g} s from {first:.4g} s on: its last value was "
         "held over a gap; leave these times out."
     )
-    weight: Weight = "doubt" if signal.check or end - first <= LONGEST_BRIDGED_GAP else "error"
+    weight: FindingWeight = "doubt" if signal.check or end - first <= LONGEST_BRIDGED_GAP else "error"
     return [Finding(CHECK_NAME, weight, signal.name, text, end - first, "s", (signal.name,), (first, end))]

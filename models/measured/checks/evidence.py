@@ -13,7 +13,7 @@ from models.measured.ratios import probable_mistake
 from models.measured.recording import Recording
 from models.measured.signal import MeasuredSignal, TransducerPlace
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 COMPARED_BAND = 1.0, 25.0
 """Frequency band (Hz) in which forces and motion are compared: above the drift of a free vehicle, below the bending of
@@ -37,7 +37,7 @@ class CheckedRecording:
     vehicle: CutVehicle | None
     places: Mapping[str, TransducerPlace] = field(default_factory=dict)
     stated_noise: Mapping[str, float] = field(default_factory=dict)
-    pitch_plane_parameters: Parameters | None = None
+    pitch_plane_parameters: PitchPlaneParameters | None = None
 
     @cached_property
     def forces(self) -> tuple[MeasuredSignal, ...]:

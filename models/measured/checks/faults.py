@@ -5,7 +5,7 @@ A factor is a sign, a unit or a calibration; a shift one in time; a lever moment
 about the contact patch, or a plane of the transducer.
 """
 
-from models.core.finding import Finding, Weight
+from models.core.finding import Finding, FindingWeight
 from models.measured.checks.agreement import MeasurementFault
 from models.measured.checks.evidence import CheckedRecording
 from models.measured.checks.spikes import spike_positions
@@ -48,7 +48,7 @@ def _factor_finding(checked_recording: CheckedRecording, fault: MeasurementFault
         text += f" The factor is {fault.size:.4g} +- {2 * fault.error:.2g} (95 %), if the vehicle file is right."
         return Finding("gain", "doubt", fault.name, text, 100 * (fault.size - 1), "%", fault.names)
     spiky = any(len(spike_positions(checked_recording.recording.samples(s))[0]) for s in fault.signals)
-    weight: Weight = "doubt" if spiky else "error"
+    weight: FindingWeight = "doubt" if spiky else "error"
     return Finding(kind, weight, fault.name, text, fault.size, "1", fault.names)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.core.finding import LISTED_FINDINGS, Finding, Weight
+from models.core.finding import LISTED_FINDINGS, Finding, FindingWeight
 from models.measured.checks.evidence import CheckedRecording
 from models.measured.gaps import LONGEST_BRIDGED_GAP, true_runs
 from models.measured.signal import MeasuredSignal
@@ -48,5 +48,5 @@ def _gap_finding(
     text = f"{short}: {lasts:.4g} s ({lengths[longest]} samples) are missing from {first:.4g} s on"
     if len(gap_ranges) > 1:
         text += f"; {len(gap_ranges) - 1} shorter gaps, {period * (lengths.sum() - lengths[longest]):.3g} s together"
-    weight: Weight = "error" if stops else "doubt"
+    weight: FindingWeight = "error" if stops else "doubt"
     return Finding(CHECK_NAME, weight, ", ".join(names), f"{text}: {remedy}.", lasts, "s", names, (first, end))

@@ -15,15 +15,15 @@ from models.core.csv_header import (
     FileLine,
     TableHead,
     decimal_sign,
-    find_head,
     find_headings,
+    find_heads_above_numbers,
     is_number,
     name_and_unit,
     separator_line,
     split_cells,
 )
 from models.core.errors import InputError
-from models.core.finding import Finding, Weight
+from models.core.finding import Finding, FindingWeight
 from models.measured.formats.csv_rows import CsvLayout
 from models.measured.formats.csv_times import find_stamps
 from models.measured.formats.opened import flaw_finding
@@ -234,7 +234,11 @@ def _table_head(csv_path: Path, first_lines: FirstLines) -> tuple[TableHead, IsC
     signs = (first_lines.separator,) if first_lines.separator else tuple(SEPARATORS)
     bare = [line._replace(text=line.text.strip().lstrip("# ")) for line in first_lines.comment_lines]
     every = sorted((*first_lines.lines, *bare))
-    for find, lines in ((find_head, first_lines.lines), (find_head, every), (find_headings, first_lines.lines)):
+    for find, lines in (
+        (find_heads_above_numbers, first_lines.lines),
+        (find_heads_above_numbers, every),
+        (find_headings, first_lines.lines),
+    ):
         for known in (is_clock, is_other_clock):
             heads = find(lines, known, signs)
             if len(heads) == 1:
@@ -328,7 +332,7 @@ def find_layout(
     )
     said = list[Finding]()
     for i in texts:
-        weight: Weight = "doubt" if column_units[i] or name_and_unit(table_head.names[i])[1] else "note"
+        weight: FindingWeight = "doubt" if column_units[i] or name_and_unit(table_head.names[i])[1] else "note"
         said.append(flaw_finding(csv_path, weight, f"left out, no numbers: {table_head.names[i]!r}"))
     for i in nameless:
         cells = columns[i]

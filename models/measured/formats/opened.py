@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.finding import Finding, Weight
+from models.core.finding import Finding, FindingWeight
 from models.measured.channel import SAMPLES_PER_BLOCK, FileChannel, SampleBlock
 
 SampleSpan = tuple[int, int]
@@ -105,7 +105,7 @@ def library_errors_as_input(measurement_path: Path) -> Iterator[None]:
         raise InputError(measurement_path, "", None, f"the file is damaged and cannot be read ({why})") from error
 
 
-def flaw_finding(measurement_path: Path, severity: Weight, flaw_text: str, finding_place: str = "") -> Finding:
+def flaw_finding(measurement_path: Path, severity: FindingWeight, flaw_text: str, finding_place: str = "") -> Finding:
     """Finding on a flaw in a file that could be read nevertheless."""
     return Finding("file", severity, finding_place or measurement_path.name, flaw_text)
 
@@ -157,7 +157,7 @@ def distinct_names(
                 by_group[i] = f"{group[i]}/{name}" if group[i] else name
     unique = _number_repeated(by_group)
     for name, indices in repeated.items():
-        weight: Weight = "doubt" if any(unique[i] != by_group[i] for i in indices) else "note"
+        weight: FindingWeight = "doubt" if any(unique[i] != by_group[i] for i in indices) else "note"
         text = f"{len(indices)} channels are called {name!r}: they are read as "
         findings.append(
             flaw_finding(measurement_path, weight, text + ", ".join(repr(unique[i]) for i in indices), name)

@@ -23,7 +23,7 @@ NEGLIGIBLE_SLIP = 1e-60
 LARGEST_EXPONENT = 50.0
 
 
-class Net(NamedTuple):
+class PatchGrid(NamedTuple):
     """Grid of the contact patch. Strips: position y / b, ratio of half length to a, share of the load per cell and
     height; cells: positions of their centres and of the middles of the steps to them, bounds at both; ``peak``:
     pressure in the patch's middle times a b / N."""
@@ -39,7 +39,7 @@ class Net(NamedTuple):
 
 
 @cache
-def net(cell_count: int) -> Net:
+def grid_of_patch(cell_count: int) -> PatchGrid:
     """Grid of a contact patch with an even number of strips of equal width, at least ``cell_count``, and ``cell_count``
     cells in each."""
     count = cell_count + cell_count % 2
@@ -50,10 +50,12 @@ def net(cell_count: int) -> Net:
     bound, half = 1.0 - centre**2, np.sqrt(1.0 - y**2)
     share = (1.0 - y**2) * half
     carried = share.sum() * bound.sum()
-    return Net(y, half, share / carried, centre, middle, bound, 1.0 - middle**2, cell_count * count / (4.0 * carried))
+    return PatchGrid(
+        y, half, share / carried, centre, middle, bound, 1.0 - middle**2, cell_count * count / (4.0 * carried)
+    )
 
 
-class Patch(NamedTuple):
+class TyrePatches(NamedTuple):
     """Contact patches of w tyres, each (w,): half length and half width (m), load (N), friction coefficient, stiffness
     of the bristles (N/m^3)."""
 
@@ -64,7 +66,7 @@ class Patch(NamedTuple):
     stiffness: np.ndarray
 
 
-def tyre_forces(contact_patches: Patch, sliding_velocities: np.ndarray, cell_count: int) -> np.ndarray:
+def tyre_forces(contact_patches: TyrePatches, sliding_velocities: np.ndarray, cell_count: int) -> np.ndarray:
     """Creep forces fx, fy (N) and moments mz (N m) on w tyres, (w, 3).
 
     sliding_velocities (w, 4) : velocity on the road along and across (m/s), turning (1/s), speed of the tread (m/s).
@@ -89,15 +91,15 @@ def cornering_factor(cell_count: int) -> float:
     stiffness k) on the grid of cells."""
     ones = np.ones(1)
     return -float(
-        tyre_forces(Patch(ones, ones, ones, 1e9 * ones, ones), np.array([[0.0, 1.0, 0.0, 1.0]]), cell_count)[0, 1]
+        tyre_forces(TyrePatches(ones, ones, ones, 1e9 * ones, ones), np.array([[0.0, 1.0, 0.0, 1.0]]), cell_count)[0, 1]
     )
 
 
 def _forward_rolling_forces(
-    contact_patches: Patch, sliding_velocities: np.ndarray, rolling_speeds: np.ndarray, cell_count: int
+    contact_patches: TyrePatches, sliding_velocities: np.ndarray, rolling_speeds: np.ndarray, cell_count: int
 ) -> np.ndarray:
     """Creep forces fx, fy (N) and moments mz (N m), (w, 3), of tyres that roll forwards."""
-    of = net(cell_count)
+    of = grid_of_patch(cell_count)
     a, b = contact_patches.half_length[:, None], contact_patches.half_width[:, None]
     grip, area = contact_patches.mu * contact_patches.load, contact_patches.half_length * contact_patches.half_width
     stretch = 2.0 / cell_count * contact_patches.stiffness * contact_patches.half_length * area
@@ -106,19 +108,23 @@ def _forward_rolling_forces(
     across = of.half / (1.0 - of.y**2)
     slip = (across * (x - spin * b * of.y) + 1j * across * y).ravel()
     turning = 1j * (across * spin * a * of.half).ravel()
-    pulled, twisted = (part.reshape(len(a), -1) for part in _march(of, slip, turning))
+    pulled, twisted = (part.reshape(len(a), -1) for part in _strip_sums(of, slip, turning))
     force = grip[:, None] * of.share
     moment = force * (a * of.half * twisted - b * of.y * pulled.real)
     return np.column_stack([(force * pulled.real).sum(1), (force * pulled.imag).sum(1), moment.sum(1)])
 
 
-def _march(patch_grid: Net, slip_per_cell: np.ndarray, slip_gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _strip_sums(
+    patch_grid: PatchGrid, slip_per_cell: np.ndarray, slip_gradient: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Sums over the cells of each strip, from the leading edge on: of tractions (complex), and of position times
     lateral traction.
 
     slip_per_cell, slip_gradient : rigid slip per cell in a strip's middle, along + i across, and its change by the
     place."""
-    traction, slides = _limited(-0.5 * (slip_per_cell + slip_gradient * patch_grid.middle[0]), patch_grid.bound[0])
+    traction, slides = _limited_tractions(
+        -0.5 * (slip_per_cell + slip_gradient * patch_grid.middle[0]), patch_grid.bound[0]
+    )
     pulled, twisted, turn = (
         traction.copy(),
         patch_grid.centre[0] * traction.imag,
@@ -134,7 +140,7 @@ def _march(patch_grid: Net, slip_per_cell: np.ndarray, slip_gradient: np.ndarray
     return pulled, twisted
 
 
-def _limited(tractions: np.ndarray, friction_bound: float) -> tuple[np.ndarray, np.ndarray]:
+def _limited_tractions(tractions: np.ndarray, friction_bound: float) -> tuple[np.ndarray, np.ndarray]:
     """Tractions limited to the friction bound, and flags of those that exceeded it."""
     size = np.abs(tractions)
     beyond = size > friction_bound
@@ -152,7 +158,7 @@ def _next_tractions(
     and between them."""
     bound, last, between = friction_bounds
     stuck = tractions_before - slip_per_cell
-    after, beyond = _limited(stuck, bound)
+    after, beyond = _limited_tractions(stuck, bound)
     if not (is_sliding & beyond).any():
         return after, beyond
     z = (np.abs(slip_per_cell.real) + np.abs(slip_per_cell.imag)) / (8.0 * between)

@@ -31,7 +31,7 @@ class ConstraintTerms(NamedTuple):
     bias: np.ndarray
 
 
-class Gap(NamedTuple):
+class ConstraintGap(NamedTuple):
     """Violation (c,) of constraints in m and rad at given coordinates, and its derivative (c, n)."""
 
     size: np.ndarray
@@ -52,17 +52,21 @@ class PlainConstraints:
     def terms(self, q: np.ndarray, v: np.ndarray) -> ConstraintTerms:
         """``ConstraintTerms`` of all constraints at coordinates and rates (n,)."""
         motion = self._bodies.move(q, v)
-        terms = np.hstack((self._point_vectors(motion), *(_products(*each).T for each in self._joint_axes(motion))))
+        terms = np.hstack(
+            (self._point_vectors(motion), *(_axis_products(*each).T for each in self._joint_axes(motion)))
+        )
         rest = np.concatenate((np.zeros(len(self._rows)), terms[BIAS]))
         return ConstraintTerms(np.vstack((self._rows, terms[FIRST_DERIVATIVE:].T)), rest)
 
-    def gap(self, q: np.ndarray) -> Gap:
+    def gap(self, q: np.ndarray) -> ConstraintGap:
         """Violation of all constraints at coordinates (n,). Between axes it is the rotation vector, which vanishes only
         where the axes coincide."""
         motion = self._bodies.move(q, np.zeros_like(q))
         apart, turned = self._point_vectors(motion), [rotation_gap(*each) for each in self._joint_axes(motion)]
         size = np.concatenate((self._rows @ q - self._offsets, apart[PLACE], *(each.size for each in turned)))
-        return Gap(size, np.vstack((self._rows, apart[FIRST_DERIVATIVE:].T, *(each.jacobian for each in turned))))
+        return ConstraintGap(
+            size, np.vstack((self._rows, apart[FIRST_DERIVATIVE:].T, *(each.jacobian for each in turned)))
+        )
 
     def _point_vectors(self, body_motion: PlainMotion) -> np.ndarray:
         """Vectors between the two points of each of p constraints, with their rates and derivatives, (3 + n, 3 p), rows
@@ -78,7 +82,7 @@ class PlainConstraints:
             yield [body_motion.axes(row) @ columns for row, columns in zip(rows, axes, strict=True)]
 
 
-def _products(first_axes: np.ndarray, second_axes: np.ndarray) -> np.ndarray:
+def _axis_products(first_axes: np.ndarray, second_axes: np.ndarray) -> np.ndarray:
     """Scalar products (3, 3 + n) of three pairs of axes of two bodies, with rates and derivatives by the product
     rule."""
     terms = np.empty((len(PERPENDICULAR_AXES), len(first_axes)))
@@ -90,17 +94,17 @@ def _products(first_axes: np.ndarray, second_axes: np.ndarray) -> np.ndarray:
     return terms
 
 
-def rotation_gap(first_axes: np.ndarray, second_axes: np.ndarray) -> Gap:
+def rotation_gap(first_axes: np.ndarray, second_axes: np.ndarray) -> ConstraintGap:
     """Rotation vector (3,) from the first to the second axes, given in the first, and its derivative (3, n)."""
     turn = first_axes[PLACE].T @ second_axes[PLACE]
     change = (
         first_axes[FIRST_DERIVATIVE:].transpose(0, 2, 1) @ second_axes[PLACE]
         + first_axes[PLACE].T @ second_axes[FIRST_DERIVATIVE:]
     )
-    return Gap(Rotation.from_matrix(turn).as_rotvec(), _rotation_vectors(change @ turn.T))
+    return ConstraintGap(Rotation.from_matrix(turn).as_rotvec(), _rotation_vectors(change @ turn.T))
 
 
-def turning_rows(body_axes: np.ndarray) -> np.ndarray:
+def angular_velocity_jacobian(body_axes: np.ndarray) -> np.ndarray:
     """Jacobian (3, n) from the coordinates' rates to a body's angular velocity in space; ``body_axes`` : the body's
     axes in a ``PlainMotion``."""
     return _rotation_vectors(body_axes[FIRST_DERIVATIVE:] @ body_axes[PLACE].T)

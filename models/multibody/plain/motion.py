@@ -23,7 +23,7 @@ PLACE, RATE, BIAS, FIRST_DERIVATIVE = range(4)
 """Row indices of a body's matrices: T, T', T'' without q'', and the first of the derivatives dT/dq_i."""
 
 
-def generator(freedom: Freedom, axes: tuple[Vector, Vector, Vector] = PARALLEL) -> np.ndarray:
+def motion_generator(freedom: Freedom, axes: tuple[Vector, Vector, Vector] = PARALLEL) -> np.ndarray:
     """Generator matrix G (4, 4) of a translation along, or a rotation about, one of the axes (rows)."""
     kind, matrix = FREEDOMS.index(freedom), np.zeros((4, 4))
     x, y, z = axes[kind % 3]
@@ -35,7 +35,7 @@ def generator(freedom: Freedom, axes: tuple[Vector, Vector, Vector] = PARALLEL) 
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class BodyPoints:
     """Points on bodies: indices of their bodies (p,), and homogeneous coordinates from the bodies' centres (p, 4), in
     m, the last one 1."""
 
@@ -50,7 +50,7 @@ class PlainMotion:
 
     matrices: np.ndarray
 
-    def at(self, body_points: Points) -> np.ndarray:
+    def at(self, body_points: BodyPoints) -> np.ndarray:
         """Motion (p, 3 + n, 3) of points in space: position (m), velocity, acceleration without the q'' terms, then
         derivatives by q."""
         rows = self.matrices[body_points.rows]
@@ -93,7 +93,7 @@ class Bodies:
         self._arms = [self._arm(vehicle, body.name) for body in vehicle.bodies]
         coordinates = [[i for i, (name, _) in enumerate(self.places) if name == body.name] for body in vehicle.bodies]
         self._coordinates = coordinates
-        self._generators = np.array([generator(f, vehicle.body(name).axes) for name, f in self.places])
+        self._generators = np.array([motion_generator(f, vehicle.body(name).axes) for name, f in self.places])
         self._squares = self._generators @ self._generators
         self._turns = np.array([freedom.startswith("r") for _, freedom in self.places])
         self._inertia = np.array([_pseudo_inertia(body.mass, np.array(body.inertia)) for body in vehicle.bodies])
@@ -109,14 +109,14 @@ class Bodies:
         place = (body_name, freedom)
         return self.places.index(place) if place in self.places else -1
 
-    def points(self, bodies_and_positions: list[tuple[str | None, Vector | np.ndarray]]) -> Points:
-        """``Points`` of this vehicle, from pairs of a body (None for space) and a position in the design position
+    def points(self, bodies_and_positions: list[tuple[str | None, Vector | np.ndarray]]) -> BodyPoints:
+        """``BodyPoints`` of this vehicle, from pairs of a body (None for space) and a position in the design position
         (m)."""
         rows = [self.row[body] if body else GROUND for body, _ in bodies_and_positions]
         arms = [
             [*np.subtract(point, self.position[body] if body else 0.0), 1.0] for body, point in bodies_and_positions
         ]
-        return Points(np.array(rows, int), np.array(arms, float).reshape(-1, 4))
+        return BodyPoints(np.array(rows, int), np.array(arms, float).reshape(-1, 4))
 
     def move(self, q: np.ndarray, v: np.ndarray) -> PlainMotion:
         """Motion of all bodies at coordinates (m, rad) and rates (per s), (n,)."""

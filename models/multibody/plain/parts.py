@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.multibody.plain.motion import FIRST_DERIVATIVE, PLACE, RATE, Bodies, PlainMotion, Points
+from models.multibody.plain.motion import FIRST_DERIVATIVE, PLACE, RATE, Bodies, BodyPoints, PlainMotion
 from models.vehicles.spatial import AntiRollBar, Curve, SpatialVehicle, SpringDamper
 
 
@@ -48,12 +48,12 @@ class PlainParts:
         axes = [s.axis for s in springs] + [(0.0, 0.0, 1.0 / bar.track) for bar in bars]
         frames = [frame_of(part, default_frame) for part in both]
         rows = [bodies.row[frame] if frame else 0 for frame in frames]
-        self._axes = Points(np.array(rows, int), np.array([[*axis, 0.0] for axis in axes]).reshape(-1, 4))
+        self._axes = BodyPoints(np.array(rows, int), np.array([[*axis, 0.0] for axis in axes]).reshape(-1, 4))
         self._rolls = np.zeros((len(both), bodies.size))
         for i, (bar, frame) in enumerate(zip(bars, frames[len(springs) :], strict=True)):
             if frame != bar.body:
                 self._rolls[len(springs) + i, bodies.index(bar.body, "rx")] = 1.0
-        self._curves = [_curves(i, s) for i, s in enumerate(springs) if s.travel_force or s.rate_force]
+        self._curves = [_spring_curves(i, s) for i, s in enumerate(springs) if s.travel_force or s.rate_force]
         still = np.zeros(bodies.size)
         self._design = np.zeros(len(both))
         self._design = self.travels(bodies.move(still, still), still, still).travel
@@ -80,5 +80,5 @@ class PlainParts:
         return preloads + self.stiffness * travels.travel, other
 
 
-def _curves(spring_index: int, spring: SpringDamper) -> tuple[int, Curve | None, Curve | None]:
+def _spring_curves(spring_index: int, spring: SpringDamper) -> tuple[int, Curve | None, Curve | None]:
     return spring_index, spring.travel_force, spring.rate_force

@@ -8,7 +8,7 @@ Knots = tuple[tuple[float, float], ...]
 """Knots of a control: pairs of time (s) and value."""
 
 
-def surface(road_waves: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def road_surface(road_waves: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Heights (m) and slopes along x and y, (w,) each, of the road at positions x, y (m): the real part of a sum of
     plane waves.
 

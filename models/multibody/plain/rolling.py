@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from models.multibody.plain.bristles import Patch, cornering_factor, tyre_forces
+from models.multibody.plain.bristles import TyrePatches, cornering_factor, tyre_forces
 from models.multibody.plain.joint_elements import joint_numbers, joint_rows
 from models.multibody.plain.motion import FIRST_DERIVATIVE, PLACE, RATE, Bodies, PlainMotion
 from models.multibody.plain.parts import PlainParts
-from models.multibody.plain.road import control_value, surface
+from models.multibody.plain.road import control_value, road_surface
 from models.multibody.plain.statics import preloads_at_rest
-from models.vehicles.free_vehicle import CARRIER, chassis_of, rotor
+from models.vehicles.free_vehicle import CARRIER, chassis_of, rotor_name
 from models.vehicles.spatial import Tyre
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class TyreReport(NamedTuple):
     spin_torque: np.ndarray
 
 
-class Ledger(NamedTuple):
+class EnergyLedger(NamedTuple):
     """Energy ledger of a car on tyres: energy of springs and tyres (J); powers (W) of dampers, friction, drag and
     pushes; of brakes and drive; of the steering on the wheels."""
 
@@ -54,12 +54,12 @@ class Ledger(NamedTuple):
     steer_power: float
 
 
-class State(NamedTuple):
+class RollingState(NamedTuple):
     """Accelerations (n,) of a car on tyres at one state, with the report of the tyres and the energy ledger."""
 
     acceleration: np.ndarray
     tyres: TyreReport
-    ledger: Ledger
+    ledger: EnergyLedger
 
 
 class TyreContact(NamedTuple):
@@ -103,7 +103,7 @@ class PlainRolling:
         self._carrying = [self.bodies.row[name or chassis.name] for name in towed]
         self._headings = [self.bodies.row[name or CARRIER] for name in towed]
         self._points = self.bodies.points([(tyre.body, tyre.point) for tyre in tyres])
-        self._rotors = np.array([self.bodies.index(rotor(tyre.name), "ry") for tyre in tyres])
+        self._rotors = np.array([self.bodies.index(rotor_name(tyre.name), "ry") for tyre in tyres])
         self._height, self._stiffness, self._damping = (
             np.array(column) for column in zip(*((t.point[2], t.stiffness, t.damping) for t in tyres), strict=True)
         )
@@ -127,7 +127,7 @@ class PlainRolling:
         drive_share = np.where(front, controls.front_drive, (1.0 - controls.front_drive) / behind) / beside
         self._driven = np.where(self._towed, 0.0, drive_share)
 
-    def at(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
+    def at(self, t: float, q: np.ndarray, v: np.ndarray) -> RollingState:
         """Accelerations, tyre report and energy ledger at a time (s), coordinates and rates (n,)."""
         motion = self.bodies.move(q, v)
         mass, force = self.bodies.inertia(motion, self.handling.gravity)
@@ -144,7 +144,7 @@ class PlainRolling:
             potential=float(ledger.potential + energy),
             dissipated=float(ledger.dissipated + power - other @ travels.rate - damped @ rate),
         )
-        return State(np.linalg.solve(mass, force), report, whole)
+        return RollingState(np.linalg.solve(mass, force), report, whole)
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
@@ -157,7 +157,9 @@ class PlainRolling:
         tyres = np.array([np.column_stack(state.tyres) for state in states])
         return tyres, np.array([state.ledger for state in states])
 
-    def _wheel_forces(self, t: float, body_motion: PlainMotion, v: np.ndarray) -> tuple[np.ndarray, TyreReport, Ledger]:
+    def _wheel_forces(
+        self, t: float, body_motion: PlainMotion, v: np.ndarray
+    ) -> tuple[np.ndarray, TyreReport, EnergyLedger]:
         """Generalised forces (n,) of tyres, brakes and drive; the tyres' report; and the energy ledger of these
         forces."""
         steer, steering = control_value(self.handling.controls.steer, t)
@@ -180,7 +182,7 @@ class PlainRolling:
             **slip,
             **by_creep,
         )
-        ledger = Ledger(
+        ledger = EnergyLedger(
             float((0.5 * contact.elastic**2 / self._stiffness).sum()),
             float(contact.damping_power.sum()),
             float(torques @ beside),
@@ -193,20 +195,20 @@ class PlainRolling:
     ) -> TyreContact:
         """Loads, contact points and axes of all tyres on the road; steer (w,), rad."""
         place, speed = wheel_centres[:, PLACE], wheel_centres[:, RATE]
-        height, slope_x, slope_y = surface(self.handling.waves, place[:, 0], place[:, 1])
+        height, slope_x, slope_y = road_surface(self.handling.waves, place[:, 0], place[:, 1])
         upwards = np.column_stack([-slope_x, -slope_y, np.ones(len(height))])
         elastic = np.maximum(self.loads + self._stiffness * (height - (place[:, 2] - self._height)), 0.0)
         rising = (speed * upwards).sum(1)
         load = np.where(elastic > 0.0, np.maximum(elastic - self._damping * rising, 0.0), 0.0)
-        axle, long = self._axles(body_motion, steer_angles), _length(upwards)
+        axle, long = self._axles(body_motion, steer_angles), _vector_lengths(upwards)
         normal = upwards / long[:, None]
-        along = _cross(axle, normal)
-        flat = _length(along)
+        along = _vector_products(axle, normal)
+        flat = _vector_lengths(along)
         along /= flat[:, None]
         radius = np.maximum(place[:, 2] - height, 0.0) / (long * flat)
         down = (axle * (axle * normal).sum(1)[:, None] - normal) * (radius / flat)[:, None]
         pressing = upwards * load[:, None]
-        across = _cross(normal, along)
+        across = _vector_products(normal, along)
         return TyreContact(down, along, across, normal, axle, pressing, load * long, elastic, (load - elastic) * rising)
 
     def _sliding_velocities(
@@ -231,8 +233,8 @@ class PlainRolling:
         ).sum(1)
         spin = np.where(self._rotors >= 0, v[self._rotors], locked)
         whole = angular_velocity + axle * spin[:, None] + np.multiply.outer(steer_rates, UP)
-        sliding = wheel_centres[:, RATE] + _cross(whole, tyre_contact.down)
-        tread = -spin * (_cross(axle, tyre_contact.down) * tyre_contact.along).sum(1)
+        sliding = wheel_centres[:, RATE] + _vector_products(whole, tyre_contact.down)
+        tread = -spin * (_vector_products(axle, tyre_contact.down) * tyre_contact.along).sum(1)
         on_road = (sliding * tyre_contact.along).sum(1), (sliding * tyre_contact.across).sum(1)
         return np.column_stack([*on_road, (whole * tyre_contact.normal).sum(1), tread]), spin - locked
 
@@ -240,8 +242,8 @@ class PlainRolling:
         """Unit vectors (w, 3) along the axles, to the left: steered and inclined relative to the heading of the
         carrier, or of a towed body's x axis in the road's plane."""
         ahead = np.array([body_motion.axes(row)[PLACE, :, 0] for row in self._headings]) * (1.0, 1.0, 0.0)
-        ahead /= _length(ahead)[:, None]
-        left, level = _cross(np.tile(UP, (len(ahead), 1)), ahead), np.cos(self._leans)[:, None]
+        ahead /= _vector_lengths(ahead)[:, None]
+        left, level = _vector_products(np.tile(UP, (len(ahead), 1)), ahead), np.cos(self._leans)[:, None]
         sideways = np.cos(steer_angles)[:, None] * left - np.sin(steer_angles)[:, None] * ahead
         axles: np.ndarray = level * sideways + np.multiply.outer(np.sin(self._leans), UP)
         return axles
@@ -251,7 +253,7 @@ class PlainRolling:
         ``sliding_velocities`` (w, 4)."""
         of, ones = self.handling.tyres, np.ones(len(sliding_velocities))
         half = np.sqrt(self._radius * tyre_contact.load / self._stiffness)
-        patch = Patch(half, of.half_width * ones, tyre_contact.load, of.friction * ones, self._bristles)
+        patch = TyrePatches(half, of.half_width * ones, tyre_contact.load, of.friction * ones, self._bristles)
         return tyre_forces(patch, sliding_velocities, of.cells)
 
     def _tyre_forces(
@@ -260,7 +262,7 @@ class PlainRolling:
         """Generalised forces (n,) of tyre loads and creep forces, and the moments (w, 3) of the creep forces about the
         wheels' centres."""
         force = tyre_contact.along * creep_forces[:, [0]] + tyre_contact.across * creep_forces[:, [1]]
-        moments = _cross(tyre_contact.down, force) + tyre_contact.normal * creep_forces[:, [2]]
+        moments = _vector_products(tyre_contact.down, force) + tyre_contact.normal * creep_forces[:, [2]]
         total = np.tensordot(wheel_centres[:, FIRST_DERIVATIVE:], force + tyre_contact.loading, ((0, 2), (0, 1)))
         for row, moment in zip(self._points.rows, moments, strict=True):
             total += body_motion.moment_forces(int(row), moment)
@@ -314,12 +316,12 @@ class PlainRolling:
         return total, power
 
 
-def _length(vectors: np.ndarray) -> np.ndarray:
+def _vector_lengths(vectors: np.ndarray) -> np.ndarray:
     """Lengths (w,) of rows (w, 3)."""
     return np.sqrt((vectors * vectors).sum(1))
 
 
-def _cross(first_vectors: np.ndarray, second_vectors: np.ndarray) -> np.ndarray:
+def _vector_products(first_vectors: np.ndarray, second_vectors: np.ndarray) -> np.ndarray:
     """Vector products of rows (w, 3)."""
     product: np.ndarray = (
         first_vectors[:, NEXT] * second_vectors[:, LAST] - first_vectors[:, LAST] * second_vectors[:, NEXT]

@@ -1,9 +1,8 @@
 """Forces that hold the design position against gravity: preloads of springs and bars, and static loads of tyres.
 
 Each part bears what it would carry had the unloaded vehicle sunk under its weights: K s = w with the stiffness K of
-all parts and tyres at rest, from the derivatives of their travels (the definition of ``spatial_linear.preloads``, by
-another way to the derivatives).
-"""
+all parts and tyres at rest, from the derivatives of their travels (the definition of
+``spatial_linear.static_preloads``, by another way to the derivatives)."""
 
 import numpy as np
 

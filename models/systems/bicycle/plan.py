@@ -2,7 +2,7 @@
 
 from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
-from models.core.scene_effects import check as check_effects
+from models.core.scene_effects import check_effects
 from models.core.scene_effects import effect_lines as effect_lines
 from models.systems.bicycle.run import REFERENCE_ENGINE, bicycle_assumptions
 from models.systems.bicycle.scene import BicycleScene

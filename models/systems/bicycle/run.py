@@ -11,7 +11,7 @@ from models.bicycle.four_bodies import FALLEN_LEAN, LEAN, STEER, YAW, BicycleRid
 from models.bicycle.ideal_rolling import IdealBicycle
 from models.bicycle.rolling_tyres import RollingBicycle
 from models.core.assumptions import Assumption, with_assumptions
-from models.core.discretisation import Series, not_estimated, step_errors, with_stated_errors
+from models.core.discretisation import RunSeries, not_estimated, step_errors, with_stated_errors
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.engines.assembly import Settings
@@ -152,11 +152,11 @@ def _with_step_error(run_result: Result, scene: BicycleScene) -> Result:
         ride.steps, scene.run.step
     )  # in steps of any length: rows of longer ones are among these rows
 
-    def series(ride: BicycleRide) -> Series:
+    def series(ride: BicycleRide) -> RunSeries:
         columns = {name: ride.positions[:, list(UNIT_OF_COORDINATE).index(name)] for name in CHANNELS_WITH_ERROR}
-        return Series(ride.times, {name: values for name, values in columns.items() if np.abs(values).max() > 1e-12})
+        return RunSeries(ride.times, {name: values for name, values in columns.items() if np.abs(values).max() > 1e-12})
 
-    def rerun(step_factor: float, run_share: float) -> Series:
+    def rerun(step_factor: float, run_share: float) -> RunSeries:
         step = step_factor * scene.run.step
         step_count = int(run_share * duration / step * (1.0 + 1e-9))
         if step_factor > 1.0 and step_count < 2 * stride:

@@ -14,7 +14,7 @@ from models.bicycle.whipple import HIGHEST_SPEED, SteeringControl, Whipple, load
 from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects, with_effect_tables
 from models.core.scene_file import SceneFile, checked
-from models.core.steps import MOST_STEPS, divides, dividing_step
+from models.core.steps import MOST_STEPS, dividing_step, step_divides
 from models.core.strict import Strict, quantity
 
 LARGEST_LEAN_RATE = 3.0
@@ -84,7 +84,7 @@ def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: P
         raise InputError(scene_path, "speeds.stop", speeds.stop, f"must be above speeds.start = {speeds.start:g} m/s")
     if run.duration / run.step > MOST_STEPS:
         raise InputError(scene_path, "run.duration", run.duration, f"needs more than {MOST_STEPS:,} steps")
-    if not divides(run.step, run.duration):
+    if not step_divides(run.step, run.duration):
         allowed = (
             f"must divide run.duration = {run.duration:g} s; use for example {dividing_step(run.step, run.duration)}"
         )

@@ -1,13 +1,13 @@
 """Export of the suspended vehicle of a braking scene as a model file of an engine: bodies and joints."""
 
 from models.core.errors import InputError
-from models.engines.export import Exported, ExportSubject
+from models.engines.export import ExportedModel, ExportSubject
 from models.systems.braking.of_scene import sprung_of
 from models.systems.braking.scene import BrakingScene
 from models.systems.handling.export import AXES_TEXT, export_handling
 
 
-def exported(scene: BrakingScene, engine: str) -> Exported:
+def exported(scene: BrakingScene, engine: str) -> ExportedModel:
     """Export the vehicle on its suspension as a model file of "mujoco" or "exudyn". Raises InputError for a vehicle in
     the plane, of which engines have no model.
     """

@@ -17,7 +17,7 @@ from models.brake.surfaces import RoadSurfaces, road_of_stretches
 from models.brake.trailer import plane_of_train
 from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects
-from models.core.scene_file import parse
+from models.core.scene_file import parse_toml
 from models.core.strict import read
 from models.systems.braking.march import BrakedVehicle, braked_vehicle_on_tyres
 from models.systems.braking.measured_pressures import MeasuredPressures, read_pressures
@@ -150,7 +150,7 @@ def vehicle_of(scene: BrakingScene) -> Truck:
     name, file = scene.vehicle.parameters, scene.file
     if name.endswith(".toml"):
         path = scene.path(name, "vehicle.parameters")
-        table, file = parse(path), path.name
+        table, file = parse_toml(path), path.name
         vehicle = read(Truck, table, file)
     elif name == "paper":
         vehicle = PAPER_TRUCK

@@ -19,7 +19,7 @@ from models.vehicles.plausible import (
     USUAL_MASS,
     USUAL_TRACK,
     USUAL_WHEELBASE,
-    plausible,
+    implausible_values,
 )
 
 PROCEDURE_TEXTS = {
@@ -80,7 +80,7 @@ def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 def findings(scene: BrakingScene) -> tuple[Finding, ...]:
     """Returns doubts about implausible parameters of the vehicle, except parameters that the scene accepts."""
     if scene.vehicle.file is not None:
-        return plausible(sprung_of(scene).handling.given, scene.vehicle.accept)
+        return implausible_values(sprung_of(scene).handling.given, scene.vehicle.accept)
     return tuple(
         query for query in _implausible_parameters(vehicle_of(scene)) if query.check not in scene.vehicle.accept
     )

@@ -13,7 +13,7 @@ from models.brake.controller import LARGEST_PRESSURE, SAMPLING_PERIOD
 from models.brake.port.setup import PortTable
 from models.brake.trailer import Trailer
 from models.core.errors import InputError
-from models.core.scene_effects import check, read_tables
+from models.core.scene_effects import check_effects, read_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.own_model.scene_vehicle import MJCF_EXTENSION
@@ -201,7 +201,7 @@ def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: P
     parts = (_procedure_refusals, _vehicle_refusals, _brake_refusals, _run_refusals)
     for key_path, value, allowed in chain.from_iterable(refusals_of(scene) for refusals_of in parts):
         raise InputError(scene.file, key_path, value, allowed)
-    check(scene)
+    check_effects(scene)
     return scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, scene_path)})
 
 

@@ -12,7 +12,7 @@ from pydantic import Field
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN
 from models.contact.material import STEEL, FallingFriction, Material, MaterialPair
 from models.core.errors import InputError
-from models.core.scene_effects import check, with_effect_tables
+from models.core.scene_effects import check_effects, with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict, quantity
 
@@ -208,7 +208,7 @@ def build(scene_tables: Mapping[str, Any], scene_path: str = "", scene_folder: P
         scene, _geometry_refusals, _contact_refusals, _size_refusals, _sweep_refusals, _method_refusals
     )
     complete = with_effect_tables(scene)
-    check(complete)
+    check_effects(complete)
     _raise_first_refusal(scene, _friction_refusals)
     return complete
 

@@ -29,7 +29,7 @@ from models.core.assumptions import with_assumptions
 from models.core.discretisation import finite_rms, grid_error, with_stated_errors
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
-from models.machine.seconds import cost
+from models.machine.seconds import seconds_text
 from models.systems.contact.assumptions import pressing_assumptions
 from models.systems.contact.run import Progress, hertzian_contact, inputs_of_scene_contact, interpenetration_contact
 from models.systems.contact.scene import ContactScene
@@ -348,5 +348,5 @@ def cheapest_lines(theory_points: list[TheoryPoint]) -> list[tuple[str, ...]]:
 def _point_text(theory_point: TheoryPoint | None, error_of_point: Callable[[TheoryPoint], float]) -> str:
     if theory_point is None:
         return "none"
-    seconds = cost((theory_point.seconds, *theory_point.range))
+    seconds = seconds_text((theory_point.seconds, *theory_point.range))
     return f"{theory_point.name}, {theory_point.cells} cells: {seconds} ({100 * error_of_point(theory_point):.2g} %)"

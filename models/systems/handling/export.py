@@ -1,6 +1,6 @@
 """Export of the vehicle of a handling scene as a model file of an engine: bodies and joints."""
 
-from models.engines.export import Exported, ExportSubject, elements_left_out, export_free_vehicle
+from models.engines.export import ExportedModel, ExportSubject, elements_left_out, export_free_vehicle
 from models.multibody.numbers import Handling
 from models.systems.handling.run import driven_model
 from models.systems.handling.scene import HandlingScene
@@ -8,7 +8,7 @@ from models.systems.handling.scene import HandlingScene
 AXES_TEXT = "x forward, y left, z up; the carrier has x, y and yaw, the sway z, roll and pitch; zero is the design."
 
 
-def exported(scene: HandlingScene, engine: str) -> Exported:
+def exported(scene: HandlingScene, engine: str) -> ExportedModel:
     """Export the vehicle of the first manoeuvre, without springs, tyres and driver, as a model file of "mujoco" or
     "exudyn".
     """
@@ -20,7 +20,7 @@ def exported(scene: HandlingScene, engine: str) -> Exported:
 
 def export_handling(
     engine: str, handling_model: Handling, export_subject: ExportSubject, further_omissions: list[str]
-) -> Exported:
+) -> ExportedModel:
     """Export a vehicle as a model file of an engine. ``further_omissions`` lists what the file leaves out besides
     springs, tyres and other forces of the vehicle.
     """

@@ -11,7 +11,7 @@ from models.core.errors import RunFailed
 from models.multibody import forces as at
 from models.multibody.numbers import Handling
 from models.tyre.bristles import FADING_SPEED
-from models.vehicles.free_vehicle import SWAY, spinning
+from models.vehicles.free_vehicle import SWAY, wheel_spin_inertia
 from models.vehicles.spatial import Freedom, hitch_of
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def check_step(simulated_drive: "SimulatedDrive", engine: str) -> None:
         stiffness = 8.0 / 3.0 * n[at.RADIUS] * load / n[at.VERTICAL] * n[at.HALF_WIDTH] * n[at.BRISTLES]
         lightness = 1.0 / h.vehicle.body(tyre.body).mass
         if n[at.ROTOR] >= 0.0:
-            lightness += tyre.point[2] ** 2 / spinning(tyre, h.tyres.spin_inertia)
+            lightness += tyre.point[2] ** 2 / wheel_spin_inertia(tyre, h.tyres.spin_inertia)
         holds = force[:, i] < 0.95 * n[at.GRIP] * load
         damped = holds * stiffness * lightness / np.maximum(np.abs(tread), FADING_SPEED)
         if step * damped.max() > STABILITY_LIMIT:

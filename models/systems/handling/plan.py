@@ -9,7 +9,7 @@ from models.engines.towed_springs import towed_division
 from models.multibody.numbers import Handling
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import CONTROL_LIMITS, HandlingScene
-from models.vehicles.plausible import plausible
+from models.vehicles.plausible import implausible_values
 from models.vehicles.towing import hitch_line
 
 
@@ -21,7 +21,7 @@ def check(scene: HandlingScene, engines: tuple[str, ...]) -> None:
 
 def findings(scene: HandlingScene) -> tuple[Finding, ...]:
     """Returns doubts about implausible parameters of the vehicle, except parameters that the scene accepts."""
-    return plausible(scene.model_with_scene_controls(next(iter(scene.manoeuvres))).given, scene.vehicle.accept)
+    return implausible_values(scene.model_with_scene_controls(next(iter(scene.manoeuvres))).given, scene.vehicle.accept)
 
 
 def describe(scene: HandlingScene) -> str:

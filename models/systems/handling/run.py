@@ -12,7 +12,7 @@ import numpy as np
 from models.core.assumptions import with_assumptions
 from models.core.discretisation import (
     Estimate,
-    Series,
+    RunSeries,
     grid_error,
     not_estimated,
     reference_size,
@@ -26,7 +26,7 @@ from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.error_control import NO_ESTIMATE
-from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
+from models.engines.free_vehicle import FreeModel, LoadedVehicle, PlainModel, free_model
 from models.engines.native_parts import joint_parts
 from models.engines.towed_springs import shared_numbers, towed_division
 from models.multibody import forces as at
@@ -36,7 +36,7 @@ from models.systems.handling.limits import check_step, check_upright
 from models.systems.handling.scene import HandlingScene
 from models.vehicles.free_vehicle import chassis_of
 from models.vehicles.spatial import JointElement
-from models.vehicles.spatial_linear import mass
+from models.vehicles.spatial_linear import design_mass_matrix
 
 if TYPE_CHECKING:
     from models.multibody.plain.rolling import PlainRolling
@@ -218,7 +218,7 @@ def _with_error(run_result: Result, simulated_drive: SimulatedDrive, start_speed
         for name, values in fine.channels.items()
         if np.abs(values).max() > still.get(UNIT_OF_CHANNEL[name], STANDSTILL_SHARE * start_speed)
     }
-    by_step, method_text = step_errors(Series(fine.times, moving), rerun, STEP_ERROR_ORDER, rerun.step)
+    by_step, method_text = step_errors(RunSeries(fine.times, moving), rerun, STEP_ERROR_ORDER, rerun.step)
     by_net = rerun.by_cells(list(moving))
     estimates = {
         name: replace(summed_error(by_step[name], by_net[name]), unit=UNIT_OF_CHANNEL[name]) for name in moving
@@ -242,11 +242,11 @@ class ManoeuvreRerun:
         return float(self.drive.run.times[1])
 
     @cached_property
-    def in_double_step(self) -> Series:
+    def in_double_step(self) -> RunSeries:
         """Time series of the manoeuvre in twice the time step; raises RunFailed."""
         return self._series_on_cells(self.drive.handling.tyres.cells, 2.0)
 
-    def _series_on_cells(self, cell_count: int, step_factor: float) -> Series:
+    def _series_on_cells(self, cell_count: int, step_factor: float) -> RunSeries:
         handling, steps = self.drive.handling, int((len(self.drive.run.times) - 1) / step_factor)
         changed = handling.changed(tyres=replace(handling.tyres, cells=cell_count))
         step = step_factor * self.step
@@ -254,7 +254,7 @@ class ManoeuvreRerun:
             raise RunFailed(self.engine, f"a step of {step:g} s outlasts the manoeuvre")
         return principal_series(drive_run(self.engine, changed, self.speed, steps * step, step))
 
-    def __call__(self, step_factor: float, run_share: float) -> Series:
+    def __call__(self, step_factor: float, run_share: float) -> RunSeries:
         """Repeat the manoeuvre in twice the time step, or a share of it in half the step; returns its time series (see
         ``models.core.discretisation.Rerun``)."""
         if step_factor > 2.0:
@@ -305,14 +305,14 @@ class ManoeuvreRerun:
             for run_array in (run.times, run.positions, run.rates)
         )
         report = np.empty((len(sampled_times), len(handling.vehicle.tyres), at.REPORTED))
-        at.reports(numbers, sampled_times, positions, rates, report, np.empty((len(sampled_times), at.LEDGER)))
+        at.fill_reports(numbers, sampled_times, positions, rates, report, np.empty((len(sampled_times), at.LEDGER)))
         return report[:, :, [at.FX, at.FY]]
 
 
-def principal_series(simulated_drive: SimulatedDrive, start_time: float = 0.0) -> Series:
+def principal_series(simulated_drive: SimulatedDrive, start_time: float = 0.0) -> RunSeries:
     """Time series of the channels whose error is estimated, for a drive that begins at ``start_time`` (s)."""
     motion = dict(zip(UNIT_OF_CHANNEL, simulated_drive.velocity().T, strict=False))
-    return Series(
+    return RunSeries(
         start_time + simulated_drive.run.times,
         motion | {name: simulated_drive[name] for name in UNIT_OF_CHANNEL if name in TYRE_CHANNELS},
     )
@@ -342,7 +342,7 @@ def build_in_engine(engine: str, handling_model: Handling, solver_settings: Sett
     integrator, step and duration, needed for runs only.
     """
     if engine == REFERENCE_ENGINE:
-        return Plain(
+        return PlainModel(
             engine,
             _plain_equations(handling_model).acceleration,
             len(handling_model.vehicle.coordinates()),
@@ -362,12 +362,12 @@ def _plain_equations(handling_model: Handling) -> "PlainRolling":
     return PlainRolling(handling_model)
 
 
-def driven_model(handling_model: Handling) -> Driven:
+def driven_model(handling_model: Handling) -> LoadedVehicle:
     """Returns what an engine builds of the car: bodies, elements along joint coordinates, and all compiled forces with
     their parameters.
     """
     parts = joint_parts(handling_model.vehicle)
-    return Driven(
+    return LoadedVehicle(
         handling_model.vehicle, handling_model.gravity, handling_model.numbers, at.forces, at.set_forces, parts
     )
 
@@ -420,7 +420,9 @@ def drive_of_fixed_steps(
     """
     drive = drive_with_reports(handling_model, trajectory, engine, run_seconds)
     check_step(drive, engine)
-    check_resolved(engine, trajectory.times, trajectory.positions, trajectory.rates, mass(handling_model.vehicle))
+    check_resolved(
+        engine, trajectory.times, trajectory.positions, trajectory.rates, design_mass_matrix(handling_model.vehicle)
+    )
     return drive
 
 
@@ -446,7 +448,7 @@ def _reports_of_run(handling_model: Handling, trajectory: Trajectory, engine: st
     count, tyres = len(trajectory.times), len(handling_model.vehicle.tyres)
     report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
     states = np.ascontiguousarray(trajectory.positions), np.ascontiguousarray(trajectory.rates)
-    at.reports(handling_model.numbers, trajectory.times, *states, report, ledger)
+    at.fill_reports(handling_model.numbers, trajectory.times, *states, report, ledger)
     for element in handling_model.vehicle.joint_elements:
         travel, rate = (joint_travel(handling_model, element, values) for values in states)
         ledger[:, at.POTENTIAL] += (element.preload + 0.5 * element.stiffness * travel) * travel

@@ -11,11 +11,11 @@ from pydantic import Field, PrivateAttr
 from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects, with_effect_tables
 from models.core.scene_file import SceneFile, checked
-from models.core.steps import MOST_STEPS, divides, dividing_step
+from models.core.steps import MOST_STEPS, dividing_step, step_divides
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.engines.assembly import Settings
-from models.engines.error_control import Adaptive, check_engines
-from models.multibody.numbers import Controls, Handling, Tyres
+from models.engines.error_control import AdaptiveEngineTable, check_engines
+from models.multibody.numbers import Controls, Handling, TyreParameters
 from models.own_model.scene_vehicle import scene_vehicle
 from models.road.iso8608 import level_of_class
 from models.road.plane_waves import plane_waves
@@ -120,7 +120,9 @@ class HandlingScene(SceneFile):
     run: HandlingRunTable = HandlingRunTable()
     manoeuvres: dict[str, Manoeuvre] = Field(min_length=1, description="driven one by one, a table each")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
-    engines: dict[str, Adaptive] = Field(default_factory=dict, description="engines that pick their own steps")
+    engines: dict[str, AdaptiveEngineTable] = Field(
+        default_factory=dict, description="engines that pick their own steps"
+    )
     _measured_controls: dict[str, Controls] = PrivateAttr(default_factory=dict)
     """Controls that were computed for measured drives, by manoeuvre."""
 
@@ -149,7 +151,7 @@ class HandlingScene(SceneFile):
         waves = (
             plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if manoeuvre.rough else np.empty((0, 4))
         )
-        tyres = Tyres(**self.tyres.model_dump(exclude={"cornering"}))
+        tyres = TyreParameters(**self.tyres.model_dump(exclude={"cornering"}))
         return extended_by_effects(
             Handling(self.file_vehicle(), tyres, manoeuvre.controls(), waves, forces=self.run.forces), self
         )
@@ -229,7 +231,7 @@ def _measured_manoeuvre(scene: HandlingScene, manoeuvre_name: str, manoeuvre: Ma
         if getattr(manoeuvre, control) != NO_CONTROL:
             raise InputError(file, f"{key_path}.{control}", None, "cannot go with a measured drive, which has its own")
     period = float(drive.times[1] - drive.times[0])
-    if not divides(scene.run.step, period):
+    if not step_divides(scene.run.step, period):
         raise InputError(
             file, "run.step", scene.run.step, f"must divide {period:g} s, the clock of {key_path}.measured"
         )
@@ -246,7 +248,7 @@ def _check_times(scene: HandlingScene, key_path: str, manoeuvre: Manoeuvre) -> N
     if duration / step > MOST_STEPS:
         allowed = f"needs {duration / step:.3g} steps; at most {MOST_STEPS:,} are possible"
         raise InputError(scene.file, f"{key_path}.duration", duration, allowed)
-    if not divides(step, duration):
+    if not step_divides(step, duration):
         allowed = f"must divide {key_path}.duration = {duration:g} s; use for example {dividing_step(step, duration)}"
         raise InputError(scene.file, "run.step", step, allowed)
 

@@ -8,7 +8,7 @@ from models.core.noise import FORCES, PITCH_SENSOR, normal_samples
 from models.core.signals import Interpolation, signal_from_samples
 from models.engines.cut_vehicle import HubModel, HubRun, build, run_with_forces
 from models.multibody.cut_kernel import WRENCH
-from models.multibody.cut_table import HubInputs, table
+from models.multibody.cut_table import HubInputs, cut_vehicle_table
 from models.road.profile import RoadProfile
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle
 
@@ -96,7 +96,7 @@ def element_travels(vehicle: CutVehicle, hub_run: HubRun) -> dict[str, np.ndarra
     still = HubInputs(np.zeros((2 * len(hub_run.times) - 1, WRENCH * len(vehicle.hubs))))
     gauged = replace(vehicle, elements=gauges)
     values = run_with_forces(
-        gauged, table(gauged, still, float(hub_run.times[1])), hub_run.times, hub_run.states
+        gauged, cut_vehicle_table(gauged, still, float(hub_run.times[1])), hub_run.times, hub_run.states
     ).elements
     return {element.name: column for element, column in zip(vehicle.elements, values.T, strict=True)}
 

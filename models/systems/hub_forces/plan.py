@@ -17,7 +17,7 @@ from models.measured.signal import UNIT_OF_QUANTITY, MeasuredSignal, Quantity
 from models.systems.hub_forces.assumptions import RUN_ON_TYRES, assumptions
 from models.systems.hub_forces.scene import ForceFrame, HubScene
 from models.vehicles.cut_vehicle import CutVehicle, rigid_vehicle
-from models.vehicles.plausible import plausible
+from models.vehicles.plausible import implausible_values
 
 if TYPE_CHECKING:
     from models.measured.recording import Recording
@@ -56,7 +56,7 @@ def findings(scene: HubScene) -> tuple[Finding, ...]:
     """Returns doubts about implausible parameters of the vehicle, and about measured files."""
     vehicle = scene.cut_vehicle()
     doubts = doubts_about_files(scene, vehicle) if scene.forces.file is not None else ()
-    return (*plausible(vehicle.uncut, scene.vehicle.accept), *doubts)
+    return (*implausible_values(vehicle.uncut, scene.vehicle.accept), *doubts)
 
 
 def describe(scene: HubScene) -> str:

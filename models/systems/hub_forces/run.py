@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import Estimate, Series, not_estimated, step_errors, summed_error, with_stated_errors
+from models.core.discretisation import Estimate, RunSeries, not_estimated, step_errors, summed_error, with_stated_errors
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.signals import Smooth
 from models.core.smoothing import low_passed
-from models.core.steps import divides
+from models.core.steps import step_divides
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import ForceRoute, HubModel, HubRun, build
 from models.engines.error_control import NO_ESTIMATE
@@ -183,9 +183,9 @@ def errors_of_steps(
     """
     step, steps = float(hub_run.times[1]), len(hub_run.times) - 1
 
-    def rerun(step_factor: float, run_share: float) -> Series:
+    def rerun(step_factor: float, run_share: float) -> RunSeries:
         tried_step, count = step_factor * step, max(1, int(run_share * steps / step_factor + 1e-9))
-        if step_factor > 2.0 or (step_factor > 1.0 and sample_period and not divides(tried_step, sample_period)):
+        if step_factor > 2.0 or (step_factor > 1.0 and sample_period and not step_divides(tried_step, sample_period)):
             raise InputError(
                 "", "run.step", tried_step, "is not taken: longer steps must divide the period of the samples"
             )
@@ -212,12 +212,12 @@ def errors_of_steps(
     }, method_text
 
 
-def principal_series(vehicle: CutVehicle, hub_run: HubRun, start_time: float = 0.0) -> Series:
+def principal_series(vehicle: CutVehicle, hub_run: HubRun, start_time: float = 0.0) -> RunSeries:
     """Time series of the channels whose error is estimated, for a run that begins at ``start_time`` (s): forces of all
     elements, roll and pitch.
     """
     channels = {element.name: hub_run.elements[:, i] for i, element in enumerate(vehicle.elements)}
-    return Series(
+    return RunSeries(
         start_time + hub_run.times, channels | {"roll": hub_run.states[:, ROLL], "pitch": hub_run.states[:, PITCH]}
     )
 

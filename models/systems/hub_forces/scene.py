@@ -13,16 +13,16 @@ from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects, with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.signals import Interpolation
-from models.core.steps import divides, dividing_step
+from models.core.steps import dividing_step, step_divides
 from models.core.strict import Query, Strict, accepted_queries_field, quantity
 from models.core.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
 from models.core.time_series import CHASSIS_SAMPLE_TIME, read_time_series, wrong_time_unit_hint
 from models.engines.assembly import Settings
 from models.engines.cut_vehicle import FIXED_STEP_METHOD, ForceRoute
-from models.engines.error_control import Adaptive, check_engines
+from models.engines.error_control import AdaptiveEngineTable, check_engines
 from models.own_model.scene_vehicle import scene_vehicle
 from models.systems.hub_forces.measurement import HubForces, MeasuredAngles
-from models.vehicles.cut_vehicle import CutVehicle, cut
+from models.vehicles.cut_vehicle import CutVehicle, cut_at_hubs
 
 ForceFrame = Literal["hub", "body", "inertial"]
 NoiseKind = Literal["white", "none"]
@@ -134,7 +134,9 @@ class HubScene(SceneFile):
     stabilise: HubStabiliserTable = HubStabiliserTable()
     seed: int = Field(default=1, ge=0, le=2**62, description="of the noise")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
-    engines: dict[str, Adaptive] = Field(default_factory=dict, description="engines that pick their own steps")
+    engines: dict[str, AdaptiveEngineTable] = Field(
+        default_factory=dict, description="engines that pick their own steps"
+    )
 
     @property
     def step_count(self) -> int:
@@ -157,7 +159,7 @@ class HubScene(SceneFile):
     def cut_vehicle(self) -> CutVehicle:
         """Returns the vehicle without its tyres, cut at the hubs, with the scene's effects; raises InputError."""
         vehicle = scene_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
-        return cut(extended_by_effects(vehicle, self), self.vehicle.chassis)
+        return cut_at_hubs(extended_by_effects(vehicle, self), self.vehicle.chassis)
 
     def deviations(self, vehicle: CutVehicle) -> np.ndarray:
         """Standard deviations (6 h,) of the noise of each hub force (N) and moment (N m), hub by hub."""
@@ -188,7 +190,7 @@ class HubScene(SceneFile):
         if last_time < self.run.duration * (1 - 1e-9):
             allowed = f"the files end at {last_time:g} s{wrong_time_unit_hint(last_time, self.run.duration)}"
             raise InputError(self.file, "run.duration", self.run.duration, allowed)
-        if self.forces.interpolation == "held" and not divides(self.run.step, period):
+        if self.forces.interpolation == "held" and not step_divides(self.run.step, period):
             allowed = f"must divide the period of {period:g} s over which samples are held"
             raise InputError(self.file, "run.step", self.run.step, allowed)
         count = round(self.run.duration / period) + 1
@@ -229,10 +231,10 @@ def _check_file_only(scene_path: str, scene: HubScene) -> None:
 
 def _check_steps(scene_path: str, scene: HubScene) -> None:
     step, duration = scene.run.step, scene.run.duration
-    if not divides(step, duration):
+    if not step_divides(step, duration):
         allowed = f"must divide run.duration = {duration:g} s, as {dividing_step(step, duration)} s does"
         raise InputError(scene_path, "run.step", step, allowed)
     period = 1.0 / scene.forces.sampling_rate
-    if scene.road is not None and not (divides(step, period) and divides(period, duration)):
+    if scene.road is not None and not (step_divides(step, period) and step_divides(period, duration)):
         allowed = f"its period must be a multiple of run.step = {step:g} s and divide run.duration = {duration:g} s"
         raise InputError(scene_path, "forces.sampling_rate", scene.forces.sampling_rate, allowed)

@@ -13,7 +13,7 @@ from typing import get_args
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.signals import Sampled
+from models.core.signals import SampledSignal
 from models.drift.score import DOUBTFUL_INNOVATION_LIMIT
 from models.multibody.cut_table import HubInputs
 from models.systems.hub_forces.measurement import HubForces, MeasuredAngles
@@ -286,7 +286,7 @@ def inputs_with_moments(
     the rigid vehicle.
     """
     rows, corner = len(hub_inputs.hubs), 2 * math.pi * pull_bandwidth
-    wanted = Sampled(tilt_estimate.states, tilt_estimate.period, held=False).sample(0.0, time_step / 2, rows)
+    wanted = SampledSignal(tilt_estimate.states, tilt_estimate.period, held=False).sample(0.0, time_step / 2, rows)
     roll, pitch, _ = np.diag(rigid_vehicle(vehicle).inertia)
     pull = (roll * corner**2, 2 * damping_ratio * roll * corner, pitch * corner**2, 2 * damping_ratio * pitch * corner)
     return replace(hub_inputs, guide=np.hstack([wanted, np.zeros((rows, 2))]), pull=pull)

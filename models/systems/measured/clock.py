@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.finding import Finding, Weight
+from models.core.finding import Finding, FindingWeight
 from models.core.scene_effects import extended_by_effects
 from models.core.whole_files import write_whole
 from models.measured.channel import SAMPLES_PER_BLOCK, MeasurementSource
@@ -222,7 +222,7 @@ def _group_findings(clock_group: ClockGroup) -> Iterator[Finding]:
         f"{clock_group.signals[0].quantity}: "
         f"if its times are in {true}, not in {written}, correct the unit that heads them."
     )
-    weight: Weight = "error" if clock.period > 10 * slowest else "doubt"
+    weight: FindingWeight = "error" if clock.period > 10 * slowest else "doubt"
     yield Finding("times", weight, label, text, clock.period, "s", (clock_group.signals[0].name,))
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.core.discretisation import Estimate, estimate, estimate_rescaled, reference_size, summed_error
+from models.core.discretisation import Estimate, error_estimate, estimate_rescaled, reference_size, summed_error
 from models.systems.hub_forces.run import LEAST_CHANGE_SHARE, STEP_ERROR_ORDER
 from models.systems.measured.consequences import samples_as_recording
 from models.systems.measured.section_run import SectionOutcome, SectionRunSettings
@@ -44,7 +44,9 @@ def errors_of_steps(
     fine = march(replace(middle_job, step=0.5 * grid.step), work_folder / "half")
     stride, errors = round(coarse.period / fine.period), dict[str, Estimate]()
     for name, element in _principal_channels(run_settings, run_outcome, bool(earlier_errors)).items():
-        error = estimate(fine.samples(name)[::stride][: coarse.done], coarse.samples(name), STEP_ERROR_ORDER, grid.step)
+        error = error_estimate(
+            fine.samples(name)[::stride][: coarse.done], coarse.samples(name), STEP_ERROR_ORDER, grid.step
+        )
         scaled = replace(
             error, error=error.error * 2.0**error.order, unit="rad" if not element else _unit(run_settings, element)
         )

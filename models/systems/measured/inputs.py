@@ -15,7 +15,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.finding import Finding
-from models.core.piecewise import interpolate
+from models.core.piecewise import interpolated_rows
 from models.core.signals import Smooth
 from models.core.smoothing import low_passed
 from models.measured.gaps import bridged_signals
@@ -66,7 +66,7 @@ class StepGrid:
 
     def rows(self, sample_rows: np.ndarray, half_step_count: int) -> np.ndarray:
         """Interpolates ``sample_rows`` (n, columns) linearly at half steps 0 .. count - 1 after the first sample."""
-        return interpolate(sample_rows, *self._samples_before(half_step_count))
+        return interpolated_rows(sample_rows, *self._samples_before(half_step_count))
 
     def cubic_rows(self, sample_rows: np.ndarray, half_step_count: int) -> np.ndarray:
         """Interpolates ``sample_rows`` (n, columns) at half steps 0 .. count - 1 after the second sample, by the cubic

@@ -14,8 +14,8 @@ from models.systems.measured.assumptions import assumptions
 from models.systems.measured.channel_map import mapped_signals
 from models.systems.measured.scene import MeasuredRig, MeasuredScene
 from models.systems.measured.virtual import checked_signals as check_virtual
-from models.vehicles.plausible import plausible
-from models.vehicles.plausible_plane import plausible_plane
+from models.vehicles.implausible_values import implausible_values
+from models.vehicles.implausible_plane_values import implausible_plane_values
 
 MISSING_FORCE_TEXT = "no vertical force is mapped at {}: without it the vehicle falls"
 
@@ -83,9 +83,9 @@ def findings(scene: MeasuredScene) -> tuple[Finding, ...]:
     """
     accept, plane = scene.vehicle.accept, scene.plane()
     if plane is not None:
-        return plausible_plane(plane, accept)
+        return implausible_plane_values(plane, accept)
     vehicle = scene.rig().vehicle
-    return () if vehicle is None else plausible(vehicle.uncut, accept)
+    return () if vehicle is None else implausible_values(vehicle.uncut, accept)
 
 
 def describe(scene: MeasuredScene) -> str:

@@ -20,8 +20,8 @@ from models.systems.measured.sections import section_names
 from models.systems.measured.verdict import RUN_LIMITS
 from models.systems.measured.virtual import VirtualTable
 from models.systems.pitch_plane.scene import parameter_set
-from models.vehicles.cut_vehicle import CutVehicle, cut
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.cut_vehicle import CutVehicle, cut_at_hubs
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 Engine = Literal["reference", "exudyn", "mujoco"]
 
@@ -165,7 +165,9 @@ class MeasuredScene(SceneFile):
             )
             places = MeasurementPlaces(hubs, (CHASSIS_NAME,), springs)
             return MeasuredRig(str(given_vehicle.parameters), CHASSIS_NAME, places, springs, ("pitch",), None)
-        vehicle = cut(scene_vehicle(given_vehicle.file, self.folder, self.file, "vehicle.file"), given_vehicle.chassis)
+        vehicle = cut_at_hubs(
+            scene_vehicle(given_vehicle.file, self.folder, self.file, "vehicle.file"), given_vehicle.chassis
+        )
         bodies, elements = (tuple(each.name for each in parts) for parts in (vehicle.uncut.bodies, vehicle.elements))
         places = MeasurementPlaces(vehicle.hubs, bodies, elements, tuple(self.sensors))
         return MeasuredRig(
@@ -180,7 +182,7 @@ class MeasuredScene(SceneFile):
             for name, s in self.sensors.items()
         }
 
-    def plane(self) -> Parameters | None:
+    def plane(self) -> PitchPlaneParameters | None:
         """Returns the parameters of a pitch-plane vehicle, None for a vehicle in space; raises InputError."""
         parameters = self.vehicle.parameters
         return None if parameters is None else parameter_set(parameters, self.file, Path(self.folder))

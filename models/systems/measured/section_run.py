@@ -21,10 +21,10 @@ from models.core.finding import Finding
 from models.core.whole_files import write_whole
 from models.engines.cut_vehicle import TUMBLED_PITCH, HubModel, build, check_step
 from models.engines.protocol import SIZE_BOUND
-from models.machine.compiled import checksum
+from models.machine.compiled import folder_checksum
 from models.measured.columns import SampleFile
 from models.measured.recording import Recording, report_no_progress
-from models.multibody.cut_table import HubInputs, table
+from models.multibody.cut_table import HubInputs, cut_vehicle_table
 from models.systems.measured.inputs import PrescribedAngles, RecordingInputs, StepGrid
 from models.systems.measured.sections import SectionChannel, Sections
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, rigid_vehicle
@@ -356,14 +356,17 @@ class _RunInProgress:
 def _inputs_of(run_settings: SectionRunSettings, recording_inputs: RecordingInputs) -> dict[str, str]:
     """Checksums of all inputs on which a run's results depend, by names that users understand."""
     library = {"reference": "numpy"}.get(run_settings.engine, run_settings.engine)
-    sources = [checksum(Path(__file__).parents[2] / folder) for folder in ("multibody", "systems/measured", "measured")]
+    sources = [
+        folder_checksum(Path(__file__).parents[2] / folder) for folder in ("multibody", "systems/measured", "measured")
+    ]
     idle = HubInputs(np.zeros((1, 6 * len(recording_inputs.hubs))))
     samples = checksum_of(run_settings.recording.period, run_settings.recording.count)
     for signal in recording_inputs.used_signals:
         samples = checksum_of(samples, signal, run_settings.recording.samples(signal))
     return {
         "vehicle": checksum_of(
-            table(run_settings.vehicle, idle, run_settings.grid.step), run_settings.vehicle.tree.coordinates()
+            cut_vehicle_table(run_settings.vehicle, idle, run_settings.grid.step),
+            run_settings.vehicle.tree.coordinates(),
         ),
         "recording": samples,
         "stabiliser": repr(run_settings.hold),

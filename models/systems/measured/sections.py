@@ -16,7 +16,7 @@ from models.core.errors import InputError
 from models.measured.signal import HUB_COMPONENTS, MeasuredSignal, Quantity, TransducerPlace
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_section_kernel import CHASSIS_ROW, MOMENTS, POINT, SectionPlaces, section_results
-from models.multibody.cut_table import Joints, joints
+from models.multibody.cut_table import JointTable, joint_table_of
 from models.vehicles.cut_vehicle import CutVehicle
 
 MOTION_CHANNELS: tuple[tuple[str, Quantity | None, str, str], ...] = (
@@ -99,7 +99,7 @@ class Sections:
             is_wanted = self.wanted is None or answer.section in ("", *self.wanted)
             if is_wanted and answer.name not in sliding:
                 channel_of_column.append((column, answer))
-        joined = joints(self.vehicle)
+        joined = joint_table_of(self.vehicle)
         object.__setattr__(self, "answers", tuple(answer for _, answer in channel_of_column))
         object.__setattr__(self, "columns", np.array([column for column, _ in channel_of_column]))
         rows = [
@@ -185,7 +185,7 @@ def _zero_components(vehicle: CutVehicle, force_frame: str) -> set[str]:
     return sliding
 
 
-def _guide_arrays(vehicle: CutVehicle, joints: Joints) -> tuple[np.ndarray, np.ndarray]:
+def _guide_arrays(vehicle: CutVehicle, joints: JointTable) -> tuple[np.ndarray, np.ndarray]:
     """Returns the last joint of every guided body (g,), and which bodies, hubs and elements act behind that joint
     (g, b + h + 3 e), in the format of the compiled kernel.
     """

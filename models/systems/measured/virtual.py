@@ -11,7 +11,7 @@ from pydantic import Field
 
 from models.core.discretisation import Estimate
 from models.core.errors import InputError
-from models.core.steps import divides, dividing_step
+from models.core.steps import dividing_step, step_divides
 from models.core.strict import Strict, quantity
 from models.core.whole_files import write_whole
 from models.engines.assembly import Settings
@@ -138,10 +138,10 @@ def checked_signals(
         1.0 / virtual_settings.sampling_rate,
         f"divide virtual.duration = {virtual_settings.duration:g} s",
     )
-    if not divides(virtual_settings.step, virtual_settings.duration):
+    if not step_divides(virtual_settings.step, virtual_settings.duration):
         allowed = f"must {divides_text}, as {dividing_step(virtual_settings.step, virtual_settings.duration)} s does"
         raise InputError(scene_path, "virtual.step", virtual_settings.step, allowed)
-    if not (divides(virtual_settings.step, period) and divides(period, virtual_settings.duration)):
+    if not (step_divides(virtual_settings.step, period) and step_divides(period, virtual_settings.duration)):
         allowed = f"its period must be a multiple of virtual.step = {virtual_settings.step:g} s and {divides_text}"
         raise InputError(scene_path, "virtual.sampling_rate", virtual_settings.sampling_rate, allowed)
     known = tuple(element.name for element in vehicle.elements)

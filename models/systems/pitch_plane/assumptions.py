@@ -10,7 +10,7 @@ from models.core.assumptions import Assumption, Watched
 from models.core.errors import InputError
 from models.core.result import Result
 from models.engines.assembly import Assembly
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 SMALL_PITCH = 0.3
 """Largest pitch (rad) with linear geometry: it differs from its sine by 1.5 %."""
@@ -87,7 +87,7 @@ def _tyre_assumptions(vehicle_assembly: Assembly, tyres_may_lift: bool) -> list[
     return [Assumption("tyres press", says, remedy, forces, "N", lower_limit=-PULL_LIMIT), pressed]
 
 
-def _deflections(vehicle_parameters: Parameters, run_result: Result) -> Watched:
+def _deflections(vehicle_parameters: PitchPlaneParameters, run_result: Result) -> Watched:
     """Static deflection (n,) in m of each tyre under the wheel's force, by tyre."""
     return {
         "front tyre": run_result["f1"] / vehicle_parameters.k1,
@@ -112,7 +112,7 @@ def _spring_assumption(vehicle_assembly: Assembly, tyres_may_lift: bool) -> Assu
     )
 
 
-def _compressions(vehicle_parameters: Parameters, exact_geometry: bool, run_result: Result) -> Watched:
+def _compressions(vehicle_parameters: PitchPlaneParameters, exact_geometry: bool, run_result: Result) -> Watched:
     """Compression (n,) in m of each suspension spring from the motion of chassis and wheels, by axle."""
     sine_of_pitch = np.sin(run_result["pitch"]) if exact_geometry else run_result["pitch"]
     return {
@@ -154,7 +154,9 @@ def _artificial_force_assumption(vehicle_assembly: Assembly) -> Assumption:
     )
 
 
-def _artificial_shares(vehicle_parameters: Parameters, heave_is_prescribed: bool, run_result: Result) -> Watched:
+def _artificial_shares(
+    vehicle_parameters: PitchPlaneParameters, heave_is_prescribed: bool, run_result: Result
+) -> Watched:
     """Rms of the artificial moment, and of the artificial force where heave is prescribed, divided by the chassis'
     inertia term, up to 15 Hz. Empty where the rows are too few or too far apart.
     """

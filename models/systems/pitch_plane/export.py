@@ -3,7 +3,7 @@ road, wheel forces or prescribed motion.
 """
 
 from models.engines.assembly import Assembly, Settings
-from models.engines.export import Exported, ExportSubject, exported_exudyn_system, exported_mujoco_model
+from models.engines.export import ExportedModel, ExportSubject, exported_exudyn_system, exported_mujoco_model
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 
 AXES_TEXT_BY_ENGINE = {
@@ -21,7 +21,7 @@ INPUTS_OF_MODE = {
 """Inputs of the vehicle that an export leaves out, by the mode of excitation."""
 
 
-def exported(scene: Scene, engine: str) -> Exported:
+def exported(scene: Scene, engine: str) -> ExportedModel:
     """Export the pitch-plane vehicle as a model file of "mujoco" or "exudyn"."""
     assembly, subject = assembly_of_scene(scene), ExportSubject(scene.title, scene.file, AXES_TEXT_BY_ENGINE[engine])
     left_out = _left_out(assembly)
@@ -49,7 +49,7 @@ def _left_out(vehicle_assembly: Assembly) -> list[str]:
 
 def _in_mujoco(
     vehicle_assembly: Assembly, solver_settings: Settings, export_subject: ExportSubject, omissions: list[str]
-) -> Exported:
+) -> ExportedModel:
     from models.engines.mujoco import specification
     from models.engines.mujoco_export import add_shapes
 
@@ -58,7 +58,7 @@ def _in_mujoco(
     return exported_mujoco_model(spec, spec.compile(), {}, export_subject, omissions)
 
 
-def _in_exudyn(vehicle_assembly: Assembly, export_subject: ExportSubject, omissions: list[str]) -> Exported:
+def _in_exudyn(vehicle_assembly: Assembly, export_subject: ExportSubject, omissions: list[str]) -> ExportedModel:
     from models.engines.exudyn import coordinate_indices, native_elements
 
     built, vehicle = native_elements(vehicle_assembly), vehicle_assembly.vehicle

@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
-from models.core.scene_effects import module_of
-from models.core.steps import divides
+from models.core.scene_effects import effect_of
+from models.core.steps import step_divides
 from models.core.systems import DEFAULT_SYSTEM
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import build, guard
+from models.engines.protocol import build, check_trajectory
 from models.ensemble.runner import PathFailed
 from models.ensemble.store import ArraysByName
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, effects_in_order, settings_of
@@ -60,7 +60,7 @@ class NoisePaths:
         assembly = self.base
         for name, p in self.path_effects:
             with_path = p.model_copy(update={"path": noise_path}) if "path" in type(p).model_fields else p
-            assembly = module_of(DEFAULT_SYSTEM, name).extend(assembly, with_path)
+            assembly = effect_of(DEFAULT_SYSTEM, name).extend(assembly, with_path)
         return assembly
 
     def trajectory(self, noise_path: int) -> Trajectory:
@@ -157,7 +157,7 @@ def _shared_and_path_effects(scene: Scene) -> tuple[Assembly, tuple[tuple[str, A
     """Returns the assembly that all paths share, and the effects that have a path or depend on such an effect."""
     names, unshared = effects_in_order(scene), list[str]()
     for name in names:
-        module = module_of(DEFAULT_SYSTEM, name)
+        module = effect_of(DEFAULT_SYSTEM, name)
         if "path" in type(scene.effects[name]).model_fields or set(unshared) & {*module.NEEDS, *module.AFTER}:
             unshared.append(name)
     shared = scene.model_copy(update={"effects": {name: scene.effects[name] for name in names if name not in unshared}})
@@ -168,7 +168,7 @@ def _step_rows(scene: Scene, solver_settings: Settings, saved_times: np.ndarray)
     """Numbers of the time steps at requested times (s); raises InputError for a time between steps."""
     for time in saved_times:
         if not 0 <= time <= solver_settings.duration * (1 + 1e-9) or (
-            time > 0 and not divides(solver_settings.step, time)
+            time > 0 and not step_divides(solver_settings.step, time)
         ):
             duration, step = solver_settings.duration, solver_settings.step
             allowed = f"must lie between 0 and {duration:g} s, on a multiple of the step {step:g} s"
@@ -198,7 +198,7 @@ class MujocoThreads(NoisePaths):
             return
         for states in marched:
             try:
-                guard("mujoco", step_times, states, self.settings.duration)
+                check_trajectory("mujoco", step_times, states, self.settings.duration)
                 yield Trajectory(step_times, states)
             except RunFailed as error:
                 yield error
@@ -208,13 +208,13 @@ class MujocoThreads(NoisePaths):
         from mujoco import rollout
 
         from models.engines.mujoco_march import warning_text
-        from models.engines.mujoco_quiet import installed, without_warnings
+        from models.engines.mujoco_quiet import installed_callback, without_warnings
 
         start = np.concatenate(([0.0], self.base.initial))
         has_controls = mujoco_models[0].drive.controls is not None
         controls = np.stack([model.controls() for model in mujoco_models]) if has_controls else None
         working = mujoco_models[: self.threads]
-        with installed(mujoco_models[0].drive.law), without_warnings():
+        with installed_callback(mujoco_models[0].drive.law), without_warnings():
             sensed, _ = rollout.rollout(
                 [model.model for model in mujoco_models],
                 [model.data for model in working],

@@ -27,8 +27,8 @@ from numba.extending import register_jitable
 
 from models.core.errors import RunFailed
 from models.engines.assembly import Assembly
-from models.engines.reference import compiled_closure, march_of
-from models.engines.stability import first_order, linearised
+from models.engines.reference import compiled_closure, compiled_march
+from models.engines.stability import first_order, linearised_matrices
 
 FILTERED_STATES = np.array([0, 1, 3, 4, 5, 7])
 """Indices of z1, z2, pitch and their rates in the vehicle's state (8,)."""
@@ -57,7 +57,7 @@ class PitchStep:
     def __post_init__(self) -> None:
         assembly, signal = self.assembly, self.assembly.input
         assert signal is not None
-        pole = np.abs(np.linalg.eigvals(first_order(linearised(assembly.vehicle, ())))).max()
+        pole = np.abs(np.linalg.eigvals(first_order(linearised_matrices(assembly.vehicle, ())))).max()
         n = self._substeps = math.ceil(self.period * pole / LONGEST_SUBSTEP)
         self._rows = (0, 0, 1) if signal.held else (1, 2, 2)
         per_step, ends = n * self._rows[2], 0 if signal.held else 1
@@ -99,7 +99,7 @@ def compiled_filter_step(drive_mode: str, geometry: str) -> Any:
     sample_weights (rows, 2) : weights of the first and the last sample in each row of the inputs.
     """
     # the march goes in as Python: numba cannot cache what encloses compiled code
-    march = register_jitable(march_of(drive_mode, geometry).py_func)
+    march = register_jitable(compiled_march(drive_mode, geometry).py_func)
 
     def respond(filter_state, time_step, step_count, force_inputs, input_rows, vehicle_parameters, sample_weights):
         states, transition, parameters = np.empty((step_count + 1, 8)), np.zeros((7, 12)), vehicle_parameters.copy()

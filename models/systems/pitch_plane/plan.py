@@ -4,7 +4,7 @@ from models.core.assumptions import assumption_lines
 from models.core.errors import Refused
 from models.core.finding import Finding
 from models.core.scene_effects import effect_lines as effect_lines
-from models.core.scene_effects import module_of
+from models.core.scene_effects import effect_of
 from models.core.systems import DEFAULT_SYSTEM
 from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
@@ -13,7 +13,7 @@ from models.engines.protocol import check_assembly as check_engine
 from models.systems.pitch_plane.assumptions import assumptions
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, settings_of
 from models.vehicles.pitch_plane import STATE_NAMES
-from models.vehicles.plausible_plane import plausible_plane
+from models.vehicles.plausible_plane import implausible_plane_values
 
 MODE_TEXTS = {
     "free": "free motion on the flat road",
@@ -40,7 +40,7 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
 def findings(scene: Scene) -> tuple[Finding, ...]:
     """Returns doubts about implausible parameters of the vehicle, and about wheel forces and prescribed motions."""
     doubts = (Finding("input", "doubt", scene.file, text) for text in assembly_of_scene(scene).doubts)
-    return (*plausible_plane(scene.vehicle_parameters(), scene.vehicle.accept), *doubts)
+    return (*implausible_plane_values(scene.vehicle_parameters(), scene.vehicle.accept), *doubts)
 
 
 def describe(scene: Scene) -> str:
@@ -93,7 +93,7 @@ def _channel_lines(vehicle_assembly: Assembly) -> list[str]:
     names += ["enforced_force"] if vehicle_assembly.mode == "heave-pitch" else []
     names += ["inertia_term", "enforced_moment"] if vehicle_assembly.guided else []
     return names + [
-        channel for name in vehicle_assembly.scene.effects for channel in module_of(DEFAULT_SYSTEM, name).CHANNELS
+        channel for name in vehicle_assembly.scene.effects for channel in effect_of(DEFAULT_SYSTEM, name).CHANNELS
     ]
 
 

@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import FINE_WINDOW, Series, reference_size, with_estimated_errors, with_tolerance_error
+from models.core.discretisation import (
+    FINE_WINDOW,
+    RunSeries,
+    reference_size,
+    with_estimated_errors,
+    with_tolerance_error,
+)
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
@@ -97,7 +103,7 @@ def _with_error(
     )
     method = CATALOGUE[engine][solver_settings.integrator]
 
-    def rerun(changed_settings: Settings) -> Series:
+    def rerun(changed_settings: Settings) -> RunSeries:
         trajectory = build(engine, vehicle_assembly, changed_settings).run()
         return _series_of_run(
             trajectory.times, output_channels(replace(vehicle_assembly, sensors=()), trajectory), names
@@ -109,7 +115,7 @@ def _with_error(
         )
         return with_tolerance_error(run_result, fine, looser, TOLERANCE_FACTOR, solver_settings.tolerance, sizes)
 
-    def longer(step_factor: float, run_share: float) -> Series:
+    def longer(step_factor: float, run_share: float) -> RunSeries:
         return rerun(_settings_of_longer_step(solver_settings, step_factor, run_share))
 
     return with_estimated_errors(
@@ -123,7 +129,9 @@ def _with_error(
     )
 
 
-def _with_longer_engine_step(run_with_settings: Callable[[Settings], Series], solver_settings: Settings) -> Series:
+def _with_longer_engine_step(
+    run_with_settings: Callable[[Settings], RunSeries], solver_settings: Settings
+) -> RunSeries:
     """Repeats a run with the engine's longest step doubled as well, where the input allows it: this step may dominate
     the error.
     """
@@ -133,9 +141,9 @@ def _with_longer_engine_step(run_with_settings: Callable[[Settings], Series], so
         return run_with_settings(solver_settings)
 
 
-def _series_of_run(times: np.ndarray, run_channels: Channels, channel_names: tuple[str, ...]) -> Series:
+def _series_of_run(times: np.ndarray, run_channels: Channels, channel_names: tuple[str, ...]) -> RunSeries:
     """Time series of the named channels of a run."""
-    return Series(times, {name: run_channels[name][2] for name in channel_names})
+    return RunSeries(times, {name: run_channels[name][2] for name in channel_names})
 
 
 def _enforced_sizes(vehicle_assembly: Assembly, run_channels: Channels) -> dict[str, float]:

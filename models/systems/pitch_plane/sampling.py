@@ -12,7 +12,7 @@ from models.core.assumptions import Assumption
 from models.core.errors import InputError
 from models.core.noise import normal_samples
 from models.core.result import Result
-from models.core.steps import divides, dividing_step
+from models.core.steps import dividing_step, step_divides
 from models.core.time_series import write_time_series
 from models.engines.catalogue import CATALOGUE
 from models.systems.pitch_plane.assumptions import watch_function
@@ -36,7 +36,7 @@ def check_rate(scene: Scene, key_path: str, sampling_rate: float) -> None:
         raise InputError(scene.file, key_path, sampling_rate, NO_ROW_AT_SAMPLE_TEXT)
     for engine in CATALOGUE:
         step = float(scene.settings(engine).step or 0)
-        if not divides(step, 1 / sampling_rate):
+        if not step_divides(step, 1 / sampling_rate):
             allowed = (
                 f"its period {1 / sampling_rate:g} s must be a multiple of {engine}'s step {step:g} s; use a step of "
                 f"{dividing_step(step, 1 / sampling_rate)} s or another rate"
@@ -125,7 +125,7 @@ def write_samples(
     Raises InputError where the result's rows are not equally spaced at a whole part of the sampling period.
     """
     spacing = float(result.times[1] - result.times[0])
-    if not divides(spacing, 1 / sampling_rate) or not np.allclose(
+    if not step_divides(spacing, 1 / sampling_rate) or not np.allclose(
         np.diff(result.times), spacing, rtol=INSTANT_TOLERANCE, atol=0
     ):
         raise InputError(

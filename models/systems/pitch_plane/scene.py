@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.scene_effects import check_combination, module_of, read_tables
-from models.core.scene_file import SceneFile, checked, existing_file, parse
-from models.core.steps import MOST_STEPS, divides, dividing_step
+from models.core.scene_effects import check_combination, effect_of, read_tables
+from models.core.scene_file import SceneFile, checked, existing_file, parse_toml
+from models.core.steps import MOST_STEPS, dividing_step, step_divides
 from models.core.strict import Query, Strict, accepted_queries_field, quantity, read
 from models.core.systems import DEFAULT_SYSTEM
 from models.engines.assembly import Assembly, Settings
@@ -68,13 +68,13 @@ class Scene(SceneFile):
     effects: dict[str, Any] = Field(default_factory=dict, description="the effects of the scene, a table each")
     engines: dict[str, EngineTable] = Field(default_factory=dict)
 
-    def vehicle_parameters(self) -> pitch_plane.Parameters:
+    def vehicle_parameters(self) -> pitch_plane.PitchPlaneParameters:
         """Returns the vehicle's parameters with the scene's overrides. An InputError names the file
         of the wrong value.
         """
         base = parameter_set(self.vehicle.parameters, self.file, Path(self.folder))
         values = {**base.model_dump(), **self.vehicle.override}
-        p = read(pitch_plane.Parameters, values, self.file, "vehicle.override")
+        p = read(pitch_plane.PitchPlaneParameters, values, self.file, "vehicle.override")
         _check_rest(p, self)
         return p
 
@@ -94,12 +94,12 @@ class Scene(SceneFile):
         return named.model_copy(update={"integrator": named.integrator or usual, "step": named.step or self.run.step})
 
 
-def parameter_set(set_name: str, scene_path: str, scene_folder: Path) -> pitch_plane.Parameters:
+def parameter_set(set_name: str, scene_path: str, scene_folder: Path) -> pitch_plane.PitchPlaneParameters:
     """A published parameter set by its name, or the user's own from a TOML file."""
     if set_name.endswith(".toml"):
         return read(
-            pitch_plane.Parameters,
-            parse(existing_file(set_name, scene_folder, scene_path, "vehicle.parameters")),
+            pitch_plane.PitchPlaneParameters,
+            parse_toml(existing_file(set_name, scene_folder, scene_path, "vehicle.parameters")),
             set_name,
         )
     if set_name not in parameter_sets():
@@ -112,7 +112,7 @@ SMALLEST_PARAMETER = 1e-9
 """Smallest positive value of a vehicle's parameter in SI units."""
 
 
-def _check_rest(vehicle_parameters: pitch_plane.Parameters, scene: Scene) -> None:
+def _check_rest(vehicle_parameters: pitch_plane.PitchPlaneParameters, scene: Scene) -> None:
     """Raise InputError for parameters without a static equilibrium, in which every run begins, and for tiny
     parameters.
     """
@@ -205,10 +205,10 @@ def _check_step(scene: Scene, key_path: str, time_step: float) -> None:
             f"needs {length / time_step:.3g} steps of {key_path} = {time_step:g} s; at most {MOST_STEPS:,} are possible"
         )
         raise InputError(scene.file, "run.duration", length, allowed)
-    if not divides(time_step, length):
+    if not step_divides(time_step, length):
         allowed = f"must divide run.duration = {length:g} s; use for example {dividing_step(time_step, length)}"
         raise InputError(scene.file, key_path, time_step, allowed)
-    if wanted is not None and not divides(time_step, wanted):
+    if wanted is not None and not step_divides(time_step, wanted):
         allowed = f"must be a multiple of {key_path} = {time_step:g} s"
         raise InputError(scene.file, "run.output_step", wanted, allowed)
 
@@ -227,14 +227,14 @@ def assembly_of_scene(scene: Scene) -> Assembly:
     effects are imported.
     """
     p = scene.vehicle_parameters()
-    vehicle = pitch_plane.describe(p, scene.vehicle.geometry)
+    vehicle = pitch_plane.pitch_plane_vehicle(p, scene.vehicle.geometry)
     assembly = Assembly(scene, vehicle, p, "free", None, _initial_state(scene, p))
     for name in effects_in_order(scene):
-        assembly = module_of(DEFAULT_SYSTEM, name).extend(assembly, scene.effects[name])
+        assembly = effect_of(DEFAULT_SYSTEM, name).extend(assembly, scene.effects[name])
     return assembly
 
 
-def _initial_state(scene: Scene, vehicle_parameters: pitch_plane.Parameters) -> np.ndarray:
+def _initial_state(scene: Scene, vehicle_parameters: pitch_plane.PitchPlaneParameters) -> np.ndarray:
     """Initial state (8,) of a scene: the static equilibrium, except for the states in [start]."""
     state = pitch_plane.equilibrium(vehicle_parameters, scene.vehicle.geometry)
     for name, value in scene.start.items():
@@ -248,7 +248,7 @@ def effects_in_order(scene: Scene) -> list[str]:
     """Returns the names of the scene's effects, each after the effects that it needs. Raises InputError for effects
     that exclude one another.
     """
-    modules = {name: module_of(DEFAULT_SYSTEM, name) for name in scene.effects}
+    modules = {name: effect_of(DEFAULT_SYSTEM, name) for name in scene.effects}
     check_combination(modules, scene)
     ordered_effects: list[str] = []
     waiting = list(modules)

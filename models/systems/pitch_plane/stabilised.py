@@ -48,7 +48,7 @@ from models.systems.pitch_plane.virtual_measurement import (
     steps_per_sample,
     write_measurement,
 )
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 Progress = Callable[[str, float], None]
 FiguresRow = dict[str, Any]
@@ -92,9 +92,11 @@ def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> StabiliserOptions
         allowed = f"the score takes {FEWEST_ROWS} steps or more, of {COARSEST_SPACING:g} s or less"
         raise InputError(scene.file, "run", length, allowed)
     for name, factor in options.factors.items():
-        if name not in Parameters.model_fields:
+        if name not in PitchPlaneParameters.model_fields:
             allowed = "not a parameter of the vehicle"
-            raise InputError(scene.file, f"options.factors.{name}", factor, allowed, tuple(Parameters.model_fields))
+            raise InputError(
+                scene.file, f"options.factors.{name}", factor, allowed, tuple(PitchPlaneParameters.model_fields)
+            )
     for name in ("stiffnesses", "cut_offs", "sweep"):
         for value in getattr(options, name):
             if not 0.0 < value < math.inf:

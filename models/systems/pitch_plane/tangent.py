@@ -20,11 +20,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
-from models.core.signals import Sampled, Smooth
+from models.core.signals import SampledSignal, Smooth
 from models.engines.assembly import Assembly
 from models.engines.reference import compiled_closure
-from models.machine.compiled import named_closure
-from models.vehicles.pitch_plane import STATES, Parameters
+from models.machine.compiled import closure_with_unique_name
+from models.vehicles.pitch_plane import STATES, PitchPlaneParameters
 from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, suspension_forces
 
 LONGEST_TIME_STEP = 1e-3
@@ -122,7 +122,9 @@ def _step_of(state_rates, forces_turn_with_body, is_linearised):
             for j in range(columns):
                 present_errors[j, q] += step / 6 * (kx[0, j, q] + 2 * kx[1, j, q] + 2 * kx[2, j, q] + kx[3, j, q])
 
-    return register_jitable(named_closure(step_of, state_rates.__name__, forces_turn_with_body, is_linearised))
+    return register_jitable(
+        closure_with_unique_name(step_of, state_rates.__name__, forces_turn_with_body, is_linearised)
+    )
 
 
 def compile_carry(compiled_step, cache_key):
@@ -152,7 +154,7 @@ class TangentPath:
     """
 
     assembly: Assembly
-    forces: Sampled | Smooth
+    forces: SampledSignal | Smooth
     steps_per_sample: int
     samples: int
 
@@ -187,7 +189,7 @@ class TangentPath:
         self,
         start_error_columns: np.ndarray,
         force_errors: np.ndarray | None = None,
-        wrong_parameters: Parameters | None = None,
+        wrong_parameters: PitchPlaneParameters | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Propagate errors along the path. Returns states (n + 1, 8) and error columns (n + 1, m, 8) at all steps; the
         columns begin with ``start_error_columns`` (m, 8).
@@ -222,7 +224,11 @@ def tangent_path_of(vehicle_assembly: Assembly, longest_step: float = LONGEST_TI
     """
     forces = vehicle_assembly.input
     held_up = vehicle_assembly.vehicle.pitch_springs or vehicle_assembly.moment is not None
-    if vehicle_assembly.mode not in ("force", "force-body") or held_up or not isinstance(forces, Sampled | Smooth):
+    if (
+        vehicle_assembly.mode not in ("force", "force-body")
+        or held_up
+        or not isinstance(forces, SampledSignal | Smooth)
+    ):
         raise ValueError("errors grow along a free force-excited run; this one is guided or held, or has a road")
     samples = round(vehicle_assembly.scene.run.duration / forces.period)
     return TangentPath(vehicle_assembly, forces, max(1, math.ceil(forces.period / longest_step - 1e-9)), samples)

@@ -15,7 +15,7 @@ import numpy as np
 
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
-from models.core.signals import Sampled, Smooth
+from models.core.signals import SampledSignal, Smooth
 from models.drift.growth import (
     MEDIAN_OF_NORMAL,
     growth_rate,
@@ -26,7 +26,7 @@ from models.drift.growth import (
 )
 from models.engines.assembly import Assembly
 from models.systems.pitch_plane.tangent import LONGEST_TIME_STEP, TangentPath, tangent_path_of
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 if TYPE_CHECKING:
     from models.measured.axle_forces import AxleForces
@@ -146,7 +146,7 @@ def interpolation_error_curve(vehicle_assembly: Assembly, longest_step: float = 
 
 
 def model_error_curve(
-    vehicle_assembly: Assembly, wrong_parameters: Parameters, longest_step: float = LONGEST_TIME_STEP
+    vehicle_assembly: Assembly, wrong_parameters: PitchPlaneParameters, longest_step: float = LONGEST_TIME_STEP
 ) -> GrowthCurve:
     """Pitch error over time of a run with ``wrong_parameters`` instead of the assembly's parameters.
 
@@ -156,15 +156,17 @@ def model_error_curve(
     """
     parameters = vehicle_assembly.parameters.model_dump()
     change = {name: getattr(wrong_parameters, name) - value for name, value in parameters.items()}
-    mean = Parameters(**{name: value + 0.5 * change[name] for name, value in parameters.items()})
-    shifted = Parameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
+    mean = PitchPlaneParameters(**{name: value + 0.5 * change[name] for name, value in parameters.items()})
+    shifted = PitchPlaneParameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
     return _growth_by_parameters(
         tangent_path_of(replace(vehicle_assembly, parameters=mean), longest_step), wrong_parameters=shifted
     )
 
 
 def _growth_by_parameters(
-    tangent_path: TangentPath, force_errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
+    tangent_path: TangentPath,
+    force_errors: np.ndarray | None = None,
+    wrong_parameters: PitchPlaneParameters | None = None,
 ) -> GrowthCurve:
     """Pitch error over time that force errors (N) or wrong parameters cause along a path."""
     pushes = None if force_errors is None else force_errors[:, None, :]
@@ -225,7 +227,7 @@ def predict_trust(vehicle_assembly: Assembly, largest_pitch_error: float = UNTRU
         tangent_path_of(vehicle_assembly)
     except ValueError:
         return None
-    assert isinstance(forces, Sampled | Smooth)
+    assert isinstance(forces, SampledSignal | Smooth)
     times_of_causes = {
         "interpolation between the samples": interpolation_error_curve(vehicle_assembly).passing_time(
             largest_pitch_error

@@ -15,7 +15,7 @@ from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import Scene, assembly_of_scene, build
-from models.vehicles.pitch_plane import STATE_NAMES, Parameters
+from models.vehicles.pitch_plane import STATE_NAMES, PitchPlaneParameters
 
 PAPER_FACTORS = {"k3": 1.05, "k4": 0.95, "d3": 0.95, "d4": 1.05, "I": 0.95}
 """Perturbed model of the paper's Appendix B, as factors on the vehicle's parameters."""
@@ -35,7 +35,7 @@ BuildFollower = Callable[[Mapping[str, float], Mapping[str, Any]], Scene]
 
 
 def perturbed_parameters(
-    vehicle_parameters: Parameters, factor_by_parameter: Mapping[str, float] = PAPER_FACTORS
+    vehicle_parameters: PitchPlaneParameters, factor_by_parameter: Mapping[str, float] = PAPER_FACTORS
 ) -> dict[str, float]:
     """Returns the changed parameters by name: each is the value in ``vehicle_parameters`` times its factor."""
     return {name: getattr(vehicle_parameters, name) * factor for name, factor in factor_by_parameter.items()}

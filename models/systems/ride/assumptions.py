@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import eigh
 
-from models.core.assumptions import Assumption, Gaussian, Watched
+from models.core.assumptions import Assumption, GaussianValues, Watched
 from models.core.result import Result
 from models.systems.ride.scene import RideScene
 from models.systems.ride.watched import GRAVITY, ROTATION_AXES, WatchedMotion, static_loads
@@ -50,7 +50,7 @@ def assumptions(
     gains_replace_curves : whether statistical linearisation replaces nonlinear springs by gains.
     """
 
-    def values_of(motion_name: str) -> np.ndarray | Gaussian:
+    def values_of(motion_name: str) -> np.ndarray | GaussianValues:
         assert watched_motion is not None
         return watched_motion.motion_of_part(motion_name)
 
@@ -69,7 +69,7 @@ def assumptions(
     return [*assumptions_of_vehicle, *([NEARLY_GAUSSIAN] if gains_replace_curves else [])]
 
 
-ValuesByName = Callable[[str], np.ndarray | Gaussian]
+ValuesByName = Callable[[str], np.ndarray | GaussianValues]
 
 
 def _tyre_assumptions(vehicle: SpatialVehicle, values_of_motion: ValuesByName) -> Iterator[Assumption]:
@@ -86,11 +86,11 @@ def _tyre_assumptions(vehicle: SpatialVehicle, values_of_motion: ValuesByName) -
     yield Assumption("tyres press", "linear tyres stay on the road", remedy, watched, "N", lower_limit=-PULL_LIMIT)
 
 
-def _with_static_load(dynamic_loads: np.ndarray | Gaussian, static_load: float) -> np.ndarray | Gaussian:
+def _with_static_load(dynamic_loads: np.ndarray | GaussianValues, static_load: float) -> np.ndarray | GaussianValues:
     """Dynamic tyre loads (N) with the static load (N) added."""
     return (
         replace(dynamic_loads, mean=dynamic_loads.mean + static_load)
-        if isinstance(dynamic_loads, Gaussian)
+        if isinstance(dynamic_loads, GaussianValues)
         else dynamic_loads + static_load
     )
 
@@ -247,7 +247,7 @@ def _seat_assumptions(scene: RideScene) -> Iterator[Assumption]:
             deviation = deviation[0]
         rows = [f"at {speed:g} m/s" for speed in run_result["speed"]] if "speed" in run_result.data.coords else []
         deviations = {name: deviation[:, outputs.index(name)] for name in people if name in outputs}
-        return {name: Gaussian(np.zeros(len(values)), values, rows) for name, values in deviations.items()}
+        return {name: GaussianValues(np.zeros(len(values)), values, rows) for name, values in deviations.items()}
 
     yield Assumption(
         "people stay seated",

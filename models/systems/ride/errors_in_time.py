@@ -8,7 +8,7 @@ import numpy as np
 
 from models.core.discretisation import (
     Estimate,
-    Series,
+    RunSeries,
     not_estimated,
     observed_order,
     root_mean_square,
@@ -66,16 +66,16 @@ def with_error_of_drive(
     profile, step = scene.drive.profile(scene.file), float(np.diff(drive.time).max())
     shown = np.isfinite(drive.deviation).all(axis=0)
 
-    def series(time_rows: np.ndarray, deviation: np.ndarray, quasi_stationary_rows: np.ndarray) -> Series:
+    def series(time_rows: np.ndarray, deviation: np.ndarray, quasi_stationary_rows: np.ndarray) -> RunSeries:
         channels = {str(name): deviation[:, i] for i, name in enumerate(drive.names) if shown[i]}
         speed_by_speed = {
             f"{name}{EACH_SPEED_ALONE_TEXT}": quasi_stationary_rows[:, i]
             for i, name in enumerate(drive.names)
             if np.isfinite(quasi_stationary_rows[:, i]).all()
         }
-        return Series(time_rows, channels | speed_by_speed)
+        return RunSeries(time_rows, channels | speed_by_speed)
 
-    def rerun(step_factor: float, run_share: float) -> Series:
+    def rerun(step_factor: float, run_share: float) -> RunSeries:
         stride = max(1, round(step_factor))
         end = drive.time[0] + run_share * (drive.time[-1] - drive.time[0])
         wanted = drive.time[::stride][drive.time[::stride] <= end + 1e-9]

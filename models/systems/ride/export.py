@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.engines.export import (
-    Exported,
+    ExportedModel,
     ExportSubject,
     coordinate_names,
     elements_left_out,
@@ -22,7 +22,7 @@ from models.vehicles.spatial import SpatialVehicle
 AXES_TEXT = "x forward, y left, z up from the ground; the frame moves with the vehicle; zero is the design position."
 
 
-def exported(scene: RideScene, engine: str) -> Exported:
+def exported(scene: RideScene, engine: str) -> ExportedModel:
     """Export the vehicle as a model file of "mujoco" (bodies and joints) or "exudyn" (with linear springs and tyres).
     Raises Refused for reduced vehicles.
     """
@@ -37,7 +37,9 @@ def exported(scene: RideScene, engine: str) -> Exported:
     return (_in_exudyn if engine == "exudyn" else _in_mujoco)(still, subject, by_speed)
 
 
-def _in_exudyn(vehicle: SpatialVehicle, export_subject: ExportSubject, speed_dependent_items: list[str]) -> Exported:
+def _in_exudyn(
+    vehicle: SpatialVehicle, export_subject: ExportSubject, speed_dependent_items: list[str]
+) -> ExportedModel:
     from models.engines.exudyn_export import items_with_functions
     from models.engines.spatial_exudyn_build import RoadRows, assemble
 
@@ -50,14 +52,16 @@ def _in_exudyn(vehicle: SpatialVehicle, export_subject: ExportSubject, speed_dep
     return exported_exudyn_system(mbs, names, export_subject, [*items_with_functions(mbs), *speed_dependent_items])
 
 
-def _in_mujoco(vehicle: SpatialVehicle, export_subject: ExportSubject, speed_dependent_items: list[str]) -> Exported:
+def _in_mujoco(
+    vehicle: SpatialVehicle, export_subject: ExportSubject, speed_dependent_items: list[str]
+) -> ExportedModel:
     from models.engines.mujoco_export import add_shapes
-    from models.engines.mujoco_inertia import realisable
-    from models.engines.mujoco_tree import MujocoIndices, set_masses, spec_of
+    from models.engines.mujoco_inertia import with_realisable_inertia
+    from models.engines.mujoco_tree import MujocoIndices, mujoco_specification, set_masses
 
     left_out = [*elements_left_out(vehicle), *speed_dependent_items]
-    vehicle, lowered = realisable(vehicle)
-    spec = spec_of(vehicle, 1e-3)
+    vehicle, lowered = with_realisable_inertia(vehicle)
+    spec = mujoco_specification(vehicle, 1e-3)
     add_shapes(spec, masses_of_shown_bodies(vehicle, {body.name for body in spec.bodies}))
     model = spec.compile()
     set_masses(model, MujocoIndices(vehicle, model), vehicle.bodies)

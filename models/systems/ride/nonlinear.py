@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from models.core.assumptions import with_assumptions
-from models.core.discretisation import Series, with_estimated_errors
+from models.core.discretisation import RunSeries, with_estimated_errors
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity
 from models.core.trajectory import Trajectory
@@ -34,9 +34,9 @@ from models.systems.ride.errors_in_time import with_error_of_copies
 from models.systems.ride.of_scene import excitation_of, linear_vehicle
 from models.systems.ride.scene import RideScene
 from models.systems.ride.watched import MotionInRun, SpectralMotion, checked_speeds, watched_vehicle
-from models.vehicles.linear_vehicle import Output
+from models.vehicles.linear_vehicle import LinearOutput
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import linearise, preloads, wheels
+from models.vehicles.spatial_linear import linearise, static_preloads, wheels
 
 LONGEST_TIME_STEP = 2e-3
 """Longest time step (s) of runs in engines; stiff springs need a shorter step."""
@@ -293,11 +293,13 @@ def _with_error_of_steps(
     steps = len(road_heights) // 2
     first = STEPS_BETWEEN_ROWS * int(min(skipped_time / road_path.step, FIRST_ROW_SHARE * steps) / STEPS_BETWEEN_ROWS)
 
-    def series(ride: EngineRide, begin_time: float) -> Series:
+    def series(ride: EngineRide, begin_time: float) -> RunSeries:
         known = ~np.isnan(ride.outputs).any(axis=0)
-        return Series(begin_time + ride.times, {name: ride.outputs[:, i] for i, name in enumerate(names) if known[i]})
+        return RunSeries(
+            begin_time + ride.times, {name: ride.outputs[:, i] for i, name in enumerate(names) if known[i]}
+        )
 
-    def rerun(step_factor: float, run_share: float) -> Series:
+    def rerun(step_factor: float, run_share: float) -> RunSeries:
         longer, stride = (
             replace(road_path, half_step=step_factor * road_path.half_step),
             max(1, round(STEPS_BETWEEN_ROWS / step_factor) if step_factor <= 2.0 else 8),
@@ -453,14 +455,14 @@ def _outputs_at_steps(
                     output, rate_factors=0.0 * output.rate_factors, road_rate_factors=0.0 * output.road_rate_factors
                 )
             )
-            load = preloads(vehicle).tyres[spec.tyre]
+            load = static_preloads(vehicle).tyres[spec.tyre]
             values[:] = np.maximum(np.minimum(load + values, 2.0 * (load + elastic)), 0.0) - load
     return EngineRide(
         linear.names, trajectory, step_indices * road.step - step_indices[0] * road.step, outputs, step_indices
     )
 
 
-def factors_of_output(output: Output) -> np.ndarray:
+def factors_of_output(output: LinearOutput) -> np.ndarray:
     """Returns the factors (3 n + 2 w,) of an output: of accelerations, rates, positions, road heights and their rates,
     in this order.
     """

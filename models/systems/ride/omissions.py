@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from models.core.scene_effects import module_of, tables_of
+from models.core.scene_effects import effect_of, effect_tables_of
 from models.systems.ride.reduced_scene import OmissibleEffect, ReducedScene
 from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import Freedom, SpatialVehicle, SpringDamper
@@ -34,7 +34,7 @@ def effects_of(reduced_scene: ReducedScene) -> tuple[OmissibleEffect, ...]:
     names of their kinds.
     """
     system = reduced_scene.ride_scene.system
-    tables = {name: module_of(system, name) for name in tables_of(reduced_scene.ride_scene)}
+    tables = {name: effect_of(system, name) for name in effect_tables_of(reduced_scene.ride_scene)}
     effects = {name: find(reduced_scene) for name, find in EFFECTS_BY_KIND.items()}
     effects |= {
         name: [

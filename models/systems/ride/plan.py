@@ -11,7 +11,7 @@ from models.systems.ride.assumptions import assumptions
 from models.systems.ride.of_scene import excitation_of, half_track_of, placed_wheels, road_of, vehicle_of
 from models.systems.ride.scene import RideScene
 from models.vehicles.linear_vehicle import WheelPosition
-from models.vehicles.plausible import plausible
+from models.vehicles.plausible import implausible_values
 from models.vehicles.spatial import NO_LIMITS, SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 
@@ -37,7 +37,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 def findings(scene: RideScene) -> tuple[Finding, ...]:
     """Returns doubts about implausible parameters of the vehicle, except parameters that the scene accepts."""
-    return plausible(vehicle_of(scene), scene.vehicle.accept)
+    return implausible_values(vehicle_of(scene), scene.vehicle.accept)
 
 
 def describe(scene: RideScene) -> str:

@@ -10,7 +10,7 @@ from models.ride.varying_speed import VaryingSpeedDeviations
 from models.systems.ride.of_scene import GRAVITY, half_track_of, linear_vehicle, placed_wheels, road_of
 from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import SpatialVehicle, TyreOutput
-from models.vehicles.spatial_linear import preloads, wheels
+from models.vehicles.spatial_linear import static_preloads, wheels
 
 LOWEST_WAVENUMBER_SHARE, HIGHEST_WAVENUMBER = 1e-2, 500.0
 """Wavenumbers between which a road is compared with an isotropic one: lowest as a share of the smallest corner
@@ -20,7 +20,7 @@ wavenumber, highest in rad/m.
 
 def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
     """Static load (N) of the tyre of every output of kind "tyre force", by output name."""
-    loads = preloads(replace(vehicle, gravity=GRAVITY)).tyres
+    loads = static_preloads(replace(vehicle, gravity=GRAVITY)).tyres
     forces = (
         tyre_output
         for tyre_output in vehicle.outputs

@@ -7,7 +7,7 @@ from models.core.scene_effects import scene_without as without_own
 from models.road.excitation import RoadExcitation
 from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.systems.ride.scene import RideScene
-from models.vehicles.spatial import Freedom, Limits, SpatialVehicle
+from models.vehicles.spatial import Freedom, ReductionLimits, SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 
 
@@ -30,9 +30,9 @@ class ReducedScene:
         return cls(ride_scene, vehicle_of(ride_scene))
 
     @property
-    def limits(self) -> Limits:
+    def limits(self) -> ReductionLimits:
         """Massless bodies, rigid springs and locked degrees of freedom by which the vehicle is reduced."""
-        return Limits(self.massless, self.rigid, self.locked)
+        return ReductionLimits(self.massless, self.rigid, self.locked)
 
     def reduced_further(self, **names_by_set: Iterable[object]) -> "ReducedScene":
         """Returns the scene with names added to its sets of left-out effects, for example massless = ["wheel"]."""

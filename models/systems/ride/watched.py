@@ -8,15 +8,15 @@ from typing import Protocol
 
 import numpy as np
 
-from models.core.assumptions import Gaussian
+from models.core.assumptions import GaussianValues
 from models.core.errors import InputError
 from models.ride.sweep import variance_sweep
 from models.road.excitation import RoadExcitation
 from models.systems.ride.of_scene import GRAVITY, LinearVehicleAtSpeed
 from models.vehicles.kinematics import Kinematics
-from models.vehicles.linear_vehicle import LinearVehicle, Output
+from models.vehicles.linear_vehicle import LinearOutput, LinearVehicle
 from models.vehicles.spatial import PartOutput, PointOutput, SpatialOutput, SpatialVehicle, TurnOutput, TyreOutput
-from models.vehicles.spatial_linear import linearise, outputs, preloads
+from models.vehicles.spatial_linear import linear_outputs, linearise, static_preloads
 
 ROTATION_AXES = {"rx": (1.0, 0.0, 0.0), "ry": (0.0, 1.0, 0.0), "rz": (0.0, 0.0, 1.0)}
 """Axis of each rotational degree of freedom."""
@@ -27,7 +27,7 @@ JUDGED_SPEED_COUNT = 5
 class WatchedMotion(Protocol):
     """Protocol of the motion of a vehicle's parts in a run; motions have the names of ``watched_outputs``."""
 
-    def motion_of_part(self, motion_name: str) -> np.ndarray | Gaussian:
+    def motion_of_part(self, motion_name: str) -> np.ndarray | GaussianValues:
         """Returns the values of a part's motion at every row of the run, or its Gaussian statistics."""
         ...
 
@@ -59,11 +59,11 @@ def watched_vehicle(linear_vehicle: LinearVehicle, vehicle: SpatialVehicle, spee
     speed (m/s).
     """
     watched = replace(vehicle, outputs=watched_outputs(vehicle))
-    rows = linearise(watched, speed).outputs if vehicle.limits else outputs(watched, Kinematics(watched))
-    return replace(linear_vehicle, outputs=(*rows, *_slip_outputs(vehicle, rows, speed)))
+    rows = linearise(watched, speed).linear_outputs if vehicle.limits else linear_outputs(watched, Kinematics(watched))
+    return replace(linear_vehicle, linear_outputs=(*rows, *_slip_outputs(vehicle, rows, speed)))
 
 
-def _slip_outputs(vehicle: SpatialVehicle, outputs: tuple[Output, ...], speed: float) -> Iterator[Output]:
+def _slip_outputs(vehicle: SpatialVehicle, outputs: tuple[LinearOutput, ...], speed: float) -> Iterator[LinearOutput]:
     """Yields the slip angle (rad) at a speed (m/s) of every tyre with a side force, as an output."""
     named = {row.name: row for row in outputs}
     for force in vehicle.side_forces:
@@ -77,7 +77,7 @@ def _slip_outputs(vehicle: SpatialVehicle, outputs: tuple[Output, ...], speed: f
 def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
     """Static load (N) of every tyre by name; empty where the springs carry no weight."""
     with suppress(InputError):
-        return preloads(replace(vehicle, gravity=GRAVITY)).tyres
+        return static_preloads(replace(vehicle, gravity=GRAVITY)).tyres
     return {}
 
 
@@ -101,10 +101,10 @@ class SpectralMotion:
     speeds: Sequence[float]
     means: Mapping[str, np.ndarray]
 
-    def motion_of_part(self, motion_name: str) -> Gaussian:
+    def motion_of_part(self, motion_name: str) -> GaussianValues:
         """Returns the Gaussian statistics of a part's motion at every speed."""
         mean = self.means.get(motion_name, np.zeros(len(self.speeds)))
-        return Gaussian(mean, self._deviations[motion_name], [f"at {speed:g} m/s" for speed in self.speeds])
+        return GaussianValues(mean, self._deviations[motion_name], [f"at {speed:g} m/s" for speed in self.speeds])
 
     @cached_property
     def _deviations(self) -> dict[str, np.ndarray]:
@@ -130,11 +130,11 @@ class MotionAlongDrive:
     deviations: Mapping[str, np.ndarray]
     speed_by_speed: SpectralMotion
 
-    def motion_of_part(self, motion_name: str) -> Gaussian:
+    def motion_of_part(self, motion_name: str) -> GaussianValues:
         """Returns the Gaussian statistics of a part's motion at every instant of the drive, or at some speeds."""
         if motion_name in self.deviations:
             deviation = self.deviations[motion_name]
-            return Gaussian(np.zeros(len(deviation)), deviation)
+            return GaussianValues(np.zeros(len(deviation)), deviation)
         return self.speed_by_speed.motion_of_part(motion_name)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.scene_effects import extended_by_effects
-from models.core.scene_file import existing_file, parse
+from models.core.scene_file import existing_file, parse_toml
 from models.rail.equations import YAW, WheelsetEquations
 from models.rail.linear import critical_speed_or_reason
 from models.rail.wheelset import CHOSEN_WHEELSET, Wheelset
@@ -40,7 +40,7 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
         raise InputError(scene.file, "wheelset.parameters", name, allowed, tuple(PARAMETER_SETS))
     if base is None:
         path = existing_file(name, Path(scene.folder), scene.file, "wheelset.parameters")
-        base = _checked_wheelset(parse(path), path.name, "")
+        base = _checked_wheelset(parse_toml(path), path.name, "")
     profiles = base.profiles if scene.profiles is None else scene.profiles.with_full_paths(scene)
     if profiles is not None and FLANGE_KEY in override:
         raise InputError(

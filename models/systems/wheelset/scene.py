@@ -12,7 +12,7 @@ from models.core.errors import InputError
 from models.core.scene_effects import with_effect_tables
 from models.core.scene_file import SceneFile, checked
 from models.core.speeds import Speeds, check_speeds
-from models.core.steps import MOST_STEPS, divides, dividing_step
+from models.core.steps import MOST_STEPS, dividing_step, step_divides
 from models.core.strict import Strict, quantity
 from models.rail.laid_profiles import CrossSections
 
@@ -167,7 +167,7 @@ def _check_run(scene: WheelsetScene) -> None:
             raise InputError(scene.file, f"run.{key}", getattr(run, key), allowed)
     if run.duration / run.step > MOST_STEPS:
         raise InputError(scene.file, "run.duration", run.duration, f"needs more than {MOST_STEPS:,} steps")
-    if not divides(run.step, run.duration):
+    if not step_divides(run.step, run.duration):
         allowed = (
             f"must divide run.duration = {run.duration:g} s; use for example {dividing_step(run.step, run.duration)}"
         )

@@ -15,7 +15,7 @@ from models.contact.accuracy import LIKELY_ERROR_SHARE, coarser_cells
 from models.core.discretisation import (
     FINE_WINDOW,
     Estimate,
-    Series,
+    RunSeries,
     grid_error,
     nearest_rows,
     not_estimated,
@@ -78,7 +78,7 @@ def with_error(run_result: Result, scene: WheelsetScene, simulate_path: Simulate
     return with_stated_errors(run_result, estimates, f"a path on {other_cells} cells and some steps of other length")
 
 
-def principal_series(wheelset_path: WheelsetPath) -> Series:
+def principal_series(wheelset_path: WheelsetPath) -> RunSeries:
     """Time series of the channels whose error is stated: lateral displacement (m), yaw (rad), and creep forces (N) of
     each wheel.
     """
@@ -86,10 +86,12 @@ def principal_series(wheelset_path: WheelsetPath) -> Series:
         name: np.stack([*sums_by_wheel(wheelset_path.contacts, wheelset_path.contacts[name]).values()], axis=1)
         for name in ("fx", "fy")
     }
-    return Series(wheelset_path.times, {"y": wheelset_path.states[:, Y], "yaw": wheelset_path.states[:, YAW], **forces})
+    return RunSeries(
+        wheelset_path.times, {"y": wheelset_path.states[:, Y], "yaw": wheelset_path.states[:, YAW], **forces}
+    )
 
 
-def _channel_sizes(fine_series: Series, largest_patch_load: float) -> dict[str, float]:
+def _channel_sizes(fine_series: RunSeries, largest_patch_load: float) -> dict[str, float]:
     """Sizes of the channels, by which relative errors are divided; ``largest_patch_load`` : largest load of a patch
     (N).
     """
@@ -114,7 +116,7 @@ def with_step_factor(
     return scene.model_copy(update={"contact": contact, "run": run})
 
 
-def _coarse_series(scene: WheelsetScene, simulate_path: SimulatePath, cell_count: int) -> Series:
+def _coarse_series(scene: WheelsetScene, simulate_path: SimulatePath, cell_count: int) -> RunSeries:
     """Time series of the path on another number of cells, in twice the time step where this is possible."""
     with suppress(InputError, RunFailed):
         return principal_series(simulate_path(with_step_factor(scene, 2.0, cell_count=cell_count)))
@@ -124,8 +126,8 @@ def _coarse_series(scene: WheelsetScene, simulate_path: SimulatePath, cell_count
 def _step_errors(
     scene: WheelsetScene,
     simulate_path: SimulatePath,
-    fine_series: Series,
-    coarse_series: Series,
+    fine_series: RunSeries,
+    coarse_series: RunSeries,
     channel_sizes: Mapping[str, float],
 ) -> dict[str, Estimate]:
     """Errors of the time steps over the whole path. They are measured over its first part, and enlarged as the errors
@@ -156,7 +158,9 @@ def _step_errors(
     return estimates
 
 
-def _rms_difference(fine_series: Series, other_series: Series, channel_name: str, end_time: float = math.inf) -> float:
+def _rms_difference(
+    fine_series: RunSeries, other_series: RunSeries, channel_name: str, end_time: float = math.inf
+) -> float:
     """Root mean square of the difference of a channel between two series, up to a time (s), at the times of the coarser
     one.
     """

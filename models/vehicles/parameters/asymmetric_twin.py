@@ -1,10 +1,10 @@
 """Parameters of a twin of the published pitch-plane vehicle without its symmetry: every front value differs from its
 rear one."""
 
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import PitchPlaneParameters
 
 SOURCE = "chosen for twinrig: the published set with each pair of equal values pulled apart"
-PARAMETERS = Parameters(
+PARAMETERS = PitchPlaneParameters(
     a=1.3,
     b=0.8,
     m1=14.0,

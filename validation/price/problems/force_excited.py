@@ -14,7 +14,7 @@ import numpy as np
 
 from models.advice.price.problem import Setting
 from models.core.noise import normal_samples
-from models.core.signals import Sampled, Smooth, Stacked
+from models.core.signals import SampledSignal, Smooth, StackedSignal
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Assembly, Settings
 from models.engines.model import Model
@@ -71,7 +71,7 @@ def vehicle_under_forces() -> Assembly:
     """The vehicle without a road, under the sampled wheel forces of its run on the road."""
     on_road = assembly_of_scene(scene(DURATION))
     true = simulate(on_road.scene, "reference", Settings("RK4", SAMPLE_PERIOD / 80, DURATION))
-    forces = Sampled(np.column_stack([true["f1"], true["f2"]])[::80], SAMPLE_PERIOD, held=False)
+    forces = SampledSignal(np.column_stack([true["f1"], true["f2"]])[::80], SAMPLE_PERIOD, held=False)
     return replace(on_road.without_tyres().with_input("force", forces), assumptions=())  # those of the road are gone
 
 
@@ -154,9 +154,9 @@ class NoisyForces(ForceExcited):
     def vehicle_under_forces(self) -> Assembly:
         """The vehicle under wheel forces with noise on every sample."""
         clean = vehicle_under_forces()
-        assert isinstance(clean.input, Sampled)
+        assert isinstance(clean.input, SampledSignal)
         noise = DEVIATION * normal_samples(SEED, 0, *clean.input.values.shape)
-        return replace(clean, input=Sampled(clean.input.values + noise, SAMPLE_PERIOD, held=False))
+        return replace(clean, input=SampledSignal(clean.input.values + noise, SAMPLE_PERIOD, held=False))
 
     def read(self, finished_run: Trajectory) -> dict[str, np.ndarray]:
         """Suspension forces (n, 2) in N and states (n, 8) of a run."""
@@ -186,12 +186,14 @@ class PrescribedPitch(ForceExcited):
         """The vehicle with wheel forces and prescribed pitch as inputs; it starts with the prescribed pitch and pitch
         rate."""
         forces = vehicle_under_forces()
-        assert isinstance(forces.input, Sampled)
+        assert isinstance(forces.input, SampledSignal)
         run = build(
             "reference", assembly_of_scene(scene(DURATION)), Settings("RK4", SAMPLE_PERIOD / 80, DURATION)
         ).run()
         pitch = Smooth(run.states[::80, 3, None], SAMPLE_PERIOD, derivatives=2, degree=5)
-        assembly = replace(forces, initial=forces.initial.copy()).with_input("pitch", Stacked((forces.input, pitch)))
+        assembly = replace(forces, initial=forces.initial.copy()).with_input(
+            "pitch", StackedSignal((forces.input, pitch))
+        )
         assembly.initial[[3, 7]] = pitch.at(0.0)[:2]
         return assembly
 

@@ -22,7 +22,7 @@ from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.model import Model
 from models.engines.protocol import build
-from models.engines.reference import derivative_of
+from models.engines.reference import compiled_derivative
 from models.systems.pitch_plane.assumptions import assumptions
 from models.systems.pitch_plane.run import output_channels
 from models.systems.pitch_plane.scene import assembly_of_scene
@@ -130,7 +130,7 @@ def settings(is_quick: bool) -> tuple[Setting, ...]:
 def continuous_solution(assembly: Assembly, method_name: str, tolerance: float) -> OdeSolution:
     """Continuous solution of the paper's equations by a method of scipy, which restarts where the road is only twice
     differentiable."""
-    derivative, p = derivative_of("road", assembly.vehicle.geometry), assembly.parameters.array()
+    derivative, p = compiled_derivative("road", assembly.vehicle.geometry), assembly.parameters.array()
     assert assembly.input is not None
     road_at = assembly.input.at
     edges = [0.0, *assembly.input.knots(DURATION), DURATION]

@@ -19,13 +19,13 @@ from models.advice.price.problem import Setting
 from models.contact.inputs import Array
 from models.core.errors import Refused, RunFailed
 from models.engines.catalogue import UNAVAILABLE_INTEGRATORS
-from models.engines.contact_bridge import FREEDOMS, Wheels, add_forces, check_step, forces, linearised_wheels
-from models.engines.contact_bridge_exudyn import Forces, Rolling
-from models.engines.contact_bridge_mujoco import model
+from models.engines.contact_bridge import FREEDOMS, RailWheels, add_forces, check_step, forces, linearised_wheels
+from models.engines.contact_bridge_exudyn import RailWheelSystem, WheelForceFunctions
+from models.engines.contact_bridge_mujoco import rail_wheel_model
 from models.engines.exudyn_system import solver_counts
 from models.engines.mujoco_callback import kernel_law
 from models.engines.mujoco_march import Marcher
-from models.engines.mujoco_quiet import installed
+from models.engines.mujoco_quiet import installed_callback
 from models.engines.stability import LONG_RUN, longest_stable_step
 from models.machine.compiled import njit
 from models.machine.stack import start
@@ -153,7 +153,7 @@ class RollingWheels:
         self.units = {"creep force": "N", "displacement": "m"}
         self.key = f"wheel-{speed:g}"
         self.title = f"A wheel with FASTSIM at {speed:g} m/s, released from sliding, {DURATION:g} s"
-        self.wheels = Wheels(1, cells=CONTACT_CELLS, speed=speed)
+        self.wheels = RailWheels(1, cells=CONTACT_CELLS, speed=speed)
         self._start = np.concatenate([state_part * START_FACTORS for state_part in self.wheels.state()])
         self._table = np.array([self.wheels.masses, self.wheels.stiffness, self.wheels.damping])
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in REFERENCE_SOLVERS)
@@ -237,10 +237,10 @@ class RollingWheels:
         return WheelsetResult(solution.y[:, -1], {"steps": solution.t.size - 1, "force calls": int(solution.nfev)})
 
     def _solver_in_mujoco(self, method_name: str, step_count: int) -> WheelsetSolver:
-        marcher = Marcher(model(self.wheels, DURATION / step_count, method_name))
+        marcher = Marcher(rail_wheel_model(self.wheels, DURATION / step_count, method_name))
 
         def run() -> WheelsetResult:
-            with installed(kernel_law(forces)):
+            with installed_callback(kernel_law(forces)):
                 state = marcher.run(self._start[None], step_count)[0, -1]
             return WheelsetResult(
                 state, {"steps": step_count, "force calls": STAGES_OF_METHOD[method_name] * step_count}
@@ -249,13 +249,13 @@ class RollingWheels:
         return WheelsetSolver(run)
 
     def _solver_in_exudyn(self, setting: Setting, method_name: str) -> WheelsetSolver:
-        calls, law = [0], Forces(self.wheels)
+        calls, law = [0], WheelForceFunctions(self.wheels)
         slopes = (
             counting_calls(law.slopes, calls, JACOBIAN_EVALUATIONS)
             if setting.method.endswith(JACOBIAN_SUFFIX)
             else None
         )
-        rolling = Rolling(self.wheels, counting_calls(law.of, calls), force_slopes=slopes)
+        rolling = RailWheelSystem(self.wheels, counting_calls(law.of, calls), force_slopes=slopes)
         steps = round(DURATION / (LARGEST_STEP if setting.adaptive else setting.value))
         tolerance = setting.value if setting.adaptive else 0.0
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import preloads
+from models.vehicles.spatial_linear import static_preloads
 from validation.price.problems import free_vehicle
 from validation.price.problems.free_vehicle import (
     DURATION,
@@ -90,7 +90,7 @@ def _names_and_units_of_states(priced_problem: FreeVehicle) -> list[tuple[str, s
 
 def _parameter_tables(vehicle: SpatialVehicle) -> str:
     """Text with tables of all parameters of a vehicle."""
-    preload = preloads(vehicle)
+    preload = static_preloads(vehicle)
     parts: dict[tuple[str, ...], Sequence[Sequence[Any]]] = {
         ("body", "mass [kg]", "place", "freedoms", "inertia, rows", "parent"): [
             (

@@ -8,7 +8,7 @@ from unittest import mock
 
 import numpy as np
 
-from models.core.discretisation import errors_of
+from models.core.discretisation import error_estimates_of
 from models.core.errors import RunFailed
 from models.systems.braking import ENGINES
 from models.systems.braking.errors import motion_and_distance
@@ -118,10 +118,10 @@ def _sample_of_stop(scene: BrakingScene, engine: str) -> Sample:
         try:
             stated_run = run(scene, engine, error=True)
         except RunFailed as error:
-            if error.partial is None or not errors_of(error.partial):
+            if error.partial is None or not error_estimates_of(error.partial):
                 raise
             stated_run = error.partial
-    errors, true = errors_of(stated_run), dict[str, float]()
+    errors, true = error_estimates_of(stated_run), dict[str, float]()
     if errors:
         finer_settings = scene.run.model_copy(update={"substeps": FINER_STEPS * scene.run.substeps})
         truth = run(

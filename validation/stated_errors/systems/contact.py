@@ -10,7 +10,7 @@ import numpy as np
 
 from models.contact.accuracy import coarser_cells
 from models.contact.theories import RollingContact
-from models.core.discretisation import errors_of, finite_rms
+from models.core.discretisation import error_estimates_of, finite_rms
 from models.systems.contact.run import ERROR_ORDER_OF_CELLS, run
 from models.systems.contact.scene import ContactScene, build
 from validation.stated_errors.sample import Sample, random_samples
@@ -65,7 +65,7 @@ def _sample_of_contact(scene: ContactScene) -> Sample:
     power = ERROR_ORDER_OF_CELLS[scene.method.name] or 0
     name = f"{scene.method.name} on {cells} cells, {len(motions)} motions"
     calls = len(motions) * float(cells) ** power
-    return Sample(name, "", errors_of(run_), true, calls, calls * (coarser_cells(cells) / cells) ** power)
+    return Sample(name, "", error_estimates_of(run_), true, calls, calls * (coarser_cells(cells) / cells) ** power)
 
 
 def _forces_of_motion(

@@ -8,7 +8,7 @@ from unittest import mock
 
 import numpy as np
 
-from models.core.discretisation import errors_of
+from models.core.discretisation import error_estimates_of
 from models.core.errors import RunFailed
 from models.core.result import Result
 from models.core.trajectory import Trajectory
@@ -64,7 +64,7 @@ def _sample_of_drive(scene: HandlingScene, engine: str) -> Sample:
             if error.partial is None:
                 raise
             stated_run = error.partial
-    errors, drive = errors_of(stated_run), stated_run.detail
+    errors, drive = error_estimates_of(stated_run), stated_run.detail
     return Sample(scene.title, engine, errors, _true_errors(scene, drive, engine, stated_run), calls[0], sum(calls[1:]))
 
 
@@ -78,7 +78,7 @@ def _true_errors(scene: HandlingScene, drive: SimulatedDrive, engine: str, state
     return {
         name: float(np.sqrt(np.mean((values - truth.channels[name][::FINER_STEPS]) ** 2)))
         for name, values in principal_series(drive).channels.items()
-        if name in errors_of(stated_result)
+        if name in error_estimates_of(stated_result)
     }
 
 

@@ -11,7 +11,7 @@ from unittest import mock
 
 import numpy as np
 
-from models.core.discretisation import errors_of
+from models.core.discretisation import error_estimates_of
 from models.core.errors import RunFailed
 from models.core.result import Result
 from models.core.trajectory import Trajectory
@@ -73,7 +73,7 @@ def _sample_of_run(scene: HubScene, engine: str) -> Sample:
     """Sample from a run under hub forces with its stated error; the true error is computed by a finer run."""
     with counting_force_calls() as calls:
         stated_run = _run_with_error(scene, engine)
-    errors, plain = errors_of(stated_run), 2 * scene.step_count
+    errors, plain = error_estimates_of(stated_run), 2 * scene.step_count
     names = list(errors)
     title = f"{scene.title}, {scene.stabilise.method}, {scene.vehicle.file}"
     return Sample(

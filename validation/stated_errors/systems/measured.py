@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.discretisation import errors_of
+from models.core.discretisation import error_estimates_of
 from models.core.errors import RunFailed
 from models.core.result import Result
 from models.engines.cut_vehicle import ENGINES
@@ -77,7 +77,9 @@ def _sample_of_recording(scene_table: dict[str, Any], engine: str) -> Sample:
     )
     steps = 4.0 * (round(virtual["duration"] / scene_table["virtual"]["step"]) + stated_run.counts()["steps"])
     title = f"{scene_table['title']}, {scene_table['stabilise']['method']}"
-    return Sample(title, engine, errors_of(stated_run), _true_errors(stated_run, truth), steps, sum(calls) - steps)
+    return Sample(
+        title, engine, error_estimates_of(stated_run), _true_errors(stated_run, truth), steps, sum(calls) - steps
+    )
 
 
 def _true_errors(stated_result: Result, fine_result: Result) -> dict[str, float]:
@@ -85,5 +87,5 @@ def _true_errors(stated_result: Result, fine_result: Result) -> dict[str, float]
     mine, fine = (run_result.detail.outcome for run_result in (stated_result, fine_result))
     return {
         name: float(np.sqrt(np.mean((mine.samples(name) - fine.samples(name)[: mine.done]) ** 2)))
-        for name in errors_of(stated_result)
+        for name in error_estimates_of(stated_result)
     }

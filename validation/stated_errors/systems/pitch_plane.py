@@ -12,10 +12,10 @@ from unittest.mock import patch
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from models.core.discretisation import errors_of
+from models.core.discretisation import error_estimates_of
 from models.core.errors import RunFailed
 from models.core.result import Result
-from models.core.steps import divides
+from models.core.steps import step_divides
 from models.core.time_series import write_time_series
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE, UNAVAILABLE_INTEGRATORS
@@ -47,7 +47,7 @@ def _sample_of_run(generator: np.random.Generator, scene_folder: Path) -> Sample
     with _count_force_calls() as calls:
         run = _run_with_error(scene, engine)
     truth = _reference_run(scene, engine)
-    estimates = errors_of(run)
+    estimates = error_estimates_of(run)
     true = {name: float(np.sqrt(np.mean((run[name] - _truth_at(truth, name, run.times)) ** 2))) for name in estimates}
     settings = settings_of(scene, engine)
     fine = f"tolerance {settings.tolerance:.1e}" if CATALOGUE[engine][integrator].adaptive else f"{settings.step:.3g} s"
@@ -202,5 +202,5 @@ def _random_step(generator: np.random.Generator, duration: float, sample_period:
     wanted = float(np.exp(generator.uniform(np.log(2e-5), np.log(8e-3))))
     divided_time = duration if sample_period is None else sample_period
     step = divided_time / max(1, round(divided_time / wanted))
-    assert divides(step, duration)
+    assert step_divides(step, duration)
     return step

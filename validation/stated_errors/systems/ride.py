@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from control import lyap
 
-from models.core.discretisation import Estimate, errors_of
+from models.core.discretisation import Estimate, error_estimates_of
 from models.core.errors import RunFailed
 from models.core.result import Result
 from models.ride.covariance import noise_arrivals
@@ -82,7 +82,9 @@ def _sample_of(
     call_count: float,
     extra_call_count: float,
 ) -> Sample:
-    estimates = {channel: estimate for channel, estimate in errors_of(ride_result).items() if channel in true_errors}
+    estimates = {
+        channel: estimate for channel, estimate in error_estimates_of(ride_result).items() if channel in true_errors
+    }
     return Sample(sample_name, engine, estimates, true_errors, call_count, extra_call_count)
 
 
@@ -195,7 +197,7 @@ def _sample_of_copies(generator: np.random.Generator, sample_number: int) -> Sam
     for i, (name, gains) in enumerate(zip(run.names, result["deviation"][0], strict=True)):
         for method_name, value in (("copies", run.deviation[i]), ("gains", gains)):
             channel = f"{name}, {method_name}"
-            estimate = errors_of(result)[channel]
+            estimate = error_estimates_of(result)[channel]
             chance_part = chance.get(channel, {"error": 0.0, "share": 0.0})
             error, share = (
                 np.hypot(estimate.error, chance_part["error"]),

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.core.discretisation import errors_of, finite_rms
+from models.core.discretisation import error_estimates_of, finite_rms
 from models.systems.wheel_rail.run import ERROR_POSITION_STRIDE, WHEEL_QUANTITIES, run, wheel_sums
 from models.systems.wheel_rail.scene import WheelRailScene, build
 from validation.stated_errors.sample import Sample, random_samples
@@ -45,7 +45,7 @@ def _random_scene(generator: np.random.Generator) -> WheelRailScene:
 
 def _sample_of_position(scene: WheelRailScene) -> Sample | None:
     stated_run = run(scene, error=True)
-    estimates, case = errors_of(stated_run), next(iter(scene.cases.values()))
+    estimates, case = error_estimates_of(stated_run), next(iter(scene.cases.values()))
     contact = scene.contact(case)
     fine = replace(contact, cell_factor=contact.cell_factor / FINER_CELLS)
     placed = stated_run.detail.placements

@@ -11,7 +11,7 @@ from unittest import mock
 
 import numpy as np
 
-from models.core.discretisation import Series, errors_of, nearest_rows
+from models.core.discretisation import RunSeries, error_estimates_of, nearest_rows
 from models.core.result import Result
 from models.rail.equations import WheelsetPath
 from models.systems.wheelset import run as system
@@ -75,7 +75,7 @@ def _sample_of_path(scene: WheelsetScene, engine: str, speed: float) -> Sample:
     with mock.patch.object(system, "path", counted):
         run = system.run(scene, engine, speed, error=True)
     true = _true_errors(scene, run, lambda changed_scene: march(changed_scene, "reference", speed))
-    estimates = errors_of(run)
+    estimates = error_estimates_of(run)
     name = f"{speed:.3g} m/s, step {scene.run.step:.2g} s, {scene.contact.law}, {scene.contact.cells} cells"
     name += ", profiles" if scene.profiles else ""
     true = {channel: true[channel] for channel in estimates}
@@ -99,7 +99,7 @@ def _true_errors(
     return true | {f"{name} of cells": error for name, error in of_cells.items()}
 
 
-def _rms_differences(fine_series: Series, true_series: Series) -> dict[str, float]:
+def _rms_differences(fine_series: RunSeries, true_series: RunSeries) -> dict[str, float]:
     rows = nearest_rows(true_series.times, fine_series.times)
     return {
         name: float(np.sqrt(np.mean((values - true_series.channels[name][rows]) ** 2)))

@@ -9,7 +9,7 @@ from models.advice.price import PricedRun, SettingLadder
 from models.advice.price.problem import Setting
 from models.core.errors import InputError
 from models.core.result import Result
-from models.core.steps import divides
+from models.core.steps import step_divides
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, OUTSIDE_CLASSES, UNAVAILABLE_INTEGRATORS
 from models.systems.pitch_plane.run import run
@@ -206,7 +206,7 @@ def _base_step_and_duration(assembly: Assembly) -> tuple[float, float]:
     if period is None:
         first = length / math.ceil(length / SEARCHED_DURATION * (1 - 1e-9))
         return first, first
-    divides_evenly = divides(period, length)
+    divides_evenly = step_divides(period, length)
     base = period if divides_evenly else step * math.gcd(round(length / step), round(period / step))
     return base, min(length, base * math.ceil(SEARCHED_DURATION / base * (1 - 1e-9)))
 

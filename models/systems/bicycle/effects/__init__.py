@@ -2,12 +2,12 @@
 
 from typing import Any
 
-from models.core.scene_effects import Entry, Table
+from models.core.scene_effects import EffectEntry, Table
 
 
 def _control_effect(
     control_key: str, neutral_value: float, usual_value: float, description: str, **entry_fields: Any
-) -> Entry:
+) -> EffectEntry:
     """Returns an effect that is present where a key of [control] has a value other than ``neutral_value``.
 
     usual_value : value of the key when the effect is added to a scene.
@@ -23,7 +23,7 @@ def _control_effect(
         scene_tables.setdefault("control", {})[control_key] = usual_value
 
     cost = "a product per call"
-    return Entry(
+    return EffectEntry(
         description,
         f"control.{control_key}",
         cost,

@@ -7,7 +7,7 @@ controllers in the loop.
 
 from typing import Any
 
-from models.core.scene_effects import Entry, Table
+from models.core.scene_effects import EffectEntry, Table
 from models.systems.handling.effects import without_trailer
 
 AXLE_KEYS = ("front", "rear", "trailer")
@@ -27,7 +27,7 @@ def _sensor_effect(
     cost: str,
     counted_item: str,
     usual_value: dict[str, float],
-) -> Entry:
+) -> EffectEntry:
     """Returns an effect of sensors at the port, present where keys of [port.signals] or [port.pressures] differ from
     those of a perfect sensor.
     """
@@ -44,7 +44,7 @@ def _sensor_effect(
 
     counts = {"asked": 1, counted_item: 4}
     key_path = f"port.{signal_kind}.{key_names[0]}"
-    return Entry(
+    return EffectEntry(
         description, key_path, cost, counts, ("port",), is_present=is_present, leave_out=leave_out, put_in=put_in
     )
 
@@ -57,7 +57,7 @@ def _brake_effect(
     cost: str,
     counted_item: str,
     usual_value: Any,
-) -> Entry:
+) -> EffectEntry:
     """Returns an effect of the brakes, present where keys of [brakes.AXLE] differ from their defaults. Leaving it out
     removes ``removed_keys``; putting it in updates the front and rear tables by ``usual_value(axle, brake)``.
     """
@@ -76,7 +76,7 @@ def _brake_effect(
             brake = scene_tables.setdefault("brakes", {}).setdefault(axle, plain)
             brake.update(usual_value(axle, brake))
 
-    return Entry(
+    return EffectEntry(
         description, key_path, cost, {counted_item: 4}, is_present=is_present, leave_out=leave_out, put_in=put_in
     )
 
@@ -154,7 +154,7 @@ def _tows_bodies(scene: Any) -> bool:
 
 MEASURED_PRESSURES_KEY, SUSPENSION_KEY = ("measured_pressures",), ("suspension",)
 TABLE = {
-    "anti_lock": Entry(
+    "anti_lock": EffectEntry(
         "A controller that opens and closes the valves of every wheel",
         "controller",
         "one answer of the controller per sample",
@@ -164,7 +164,7 @@ TABLE = {
         usual_value={"kind": "slip_bang_bang"},
         is_present=lambda scene: scene.controller.kind != "none",
     ),
-    "faults": Entry(
+    "faults": EffectEntry(
         "Lost, delayed or wrong samples, and valves that are stuck, on demand",
         "port.faults",
         "one look at each fault per sample",
@@ -182,7 +182,7 @@ TABLE = {
         "loops",
         lambda axle, brake: {"falling": 1.1 * brake["gradient"]},  # chosen
     ),
-    "load_transfer": Entry(
+    "load_transfer": EffectEntry(
         "Loads that move between the wheels with the accelerations of the body, semi-static",
         "load_transfer",
         "two products per wheel and step",
@@ -191,13 +191,13 @@ TABLE = {
         why="whose springs carry the loads",
         usual_value={},
     ),
-    "measured_pressures": Entry(
+    "measured_pressures": EffectEntry(
         "Pressures from a file in place of pedal and controller",
         "measured",
         "a row of a table per sample",
         {"files": 1},
     ),
-    "port": Entry(
+    "port": EffectEntry(
         "A port between vehicle and controller, each exchange checked, behind which anything may stand",
         "port",
         "one exchange per sample, and what stands behind it",
@@ -214,7 +214,7 @@ TABLE = {
         "wrong signals",
         {"gain": 1.01},
     ),
-    "pressure_dynamics": Entry(
+    "pressure_dynamics": EffectEntry(
         "Chambers that fill and empty with time constants behind their valves",
         "pressure",
         "two exponentials per wheel and sample",
@@ -248,14 +248,14 @@ TABLE = {
         "push-outs",
         lambda axle, brake: {"push_out": 0.75 if axle == "front" else 0.25},  # of the paper's brakes
     ),
-    "rear_tyres": Entry(
+    "rear_tyres": EffectEntry(
         "Rear tyres with figures of their own",
         "tyres.own_rear",
         "a second table of friction per surface",
         {"tables": 1},
         usual_value=True,
     ),
-    "relaxation": Entry(
+    "relaxation": EffectEntry(
         "Slip angles that lag behind the motion by a relaxation length",
         "relaxation",
         "a state per wheel, exact within a step",
@@ -263,7 +263,7 @@ TABLE = {
         modules=("models.brake.relaxation",),
         usual_value={"front": 0.3, "rear": 0.3},  # m, chosen
     ),
-    "reservoir": Entry(
+    "reservoir": EffectEntry(
         "A reservoir whose pressure falls as chambers fill from it",
         "pressure.reservoir",
         "a sum over the chambers per sample",
@@ -272,7 +272,7 @@ TABLE = {
         usual_value=40.0,  # l, of a truck
         leave_out=_without_reservoir,
     ),
-    "second_surface": Entry(
+    "second_surface": EffectEntry(
         "A road of more than one surface, along it or across",
         "road.stretches",
         "the surface under each wheel is looked up at every step",
@@ -305,7 +305,7 @@ TABLE = {
         "converted signals",
         {"bits": 12, "range": 40.0},
     ),
-    "slow_apply": Entry(
+    "slow_apply": EffectEntry(
         "Valves with a fourth state beside apply, hold and release: they apply slowly",
         "pressure.slow",
         "one comparison per wheel and step",
@@ -314,14 +314,14 @@ TABLE = {
         leave_out=_without_slow_apply,
         put_in=_with_slow_apply,
     ),
-    "suspension": Entry(
+    "suspension": EffectEntry(
         "A vehicle with suspension from a vehicle file, whose body rolls and pitches under braking",
         "vehicle.file",
         "every freedom of its file, and a step of an engine around the compiled tyres",
         modules=("models.brake.sprung", "models.engines.braking_sprung"),
         leave_out=_without_suspension,
     ),
-    "teeth": Entry(
+    "teeth": EffectEntry(
         "Wheel speeds that are counted from the teeth of a wheel by a timer",
         "port.teeth",
         "the edges of every wheel within each sample",
@@ -329,7 +329,7 @@ TABLE = {
         ("port",),
         usual_value={},
     ),
-    "towed": Entry(
+    "towed": EffectEntry(
         "Bodies that the vehicle of a file tows by a hitch, on springs and wheels of their own",
         "vehicle.file",
         "the coordinates of its hitch and wheels, and a tyre, a brake and a chamber per wheel",
@@ -337,7 +337,7 @@ TABLE = {
         is_present=_tows_bodies,
         leave_out=without_trailer,
     ),
-    "trailer": Entry(
+    "trailer": EffectEntry(
         "A drawbar trailer of two axles behind the truck",
         "trailer",
         "two coordinates and four wheels more",
@@ -346,7 +346,7 @@ TABLE = {
         why="whose file says what it tows",
         put_in=_with_trailer,
     ),
-    "valve_delay": Entry(
+    "valve_delay": EffectEntry(
         "Valves that answer a while after their command",
         "pressure.delay",
         "commands that are kept for as many samples",

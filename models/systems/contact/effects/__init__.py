@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from models.core.errors import InputError
-from models.core.scene_effects import Entry, Table
+from models.core.scene_effects import EffectEntry, Table
 
 
 def _theory_effect(
@@ -18,7 +18,7 @@ def _theory_effect(
     cost: str,
     counted_item: str,
     method_without_theory: Callable[[Any], dict[str, str]],
-) -> Entry:
+) -> EffectEntry:
     """Returns the effect of a theory beyond FASTSIM. ``method_without_theory`` returns the scene's [method] without
     this theory, except the key cells.
     """
@@ -27,7 +27,7 @@ def _theory_effect(
         cells = {key: value for key, value in scene_tables["method"].items() if key == "cells"}
         scene_tables["method"] = cells | method_without_theory(scene)
 
-    return Entry(
+    return EffectEntry(
         description,
         "method.name",
         cost,
@@ -98,7 +98,7 @@ BOUND_BY_CONSTANT_FRICTION: dict[str, Any] = {
     "why": "which FASTSIM alone computes",
 }
 TABLE = {
-    "saturation": Entry(
+    "saturation": EffectEntry(
         "Slip: creep forces that friction bounds, by FASTSIM where no other theory is named",
         "method.name",
         "some microseconds per contact, where the linear theory multiplies by a matrix",
@@ -121,7 +121,7 @@ TABLE = {
         "half-spaces",
         _method_without_half_space,
     ),
-    "profiles": Entry(
+    "profiles": EffectEntry(
         "Cross-sections of wheel and rail, whose patches are looked for",
         "profiles",
         "a search for the contact points, once, and a contact computation per patch",
@@ -129,7 +129,7 @@ TABLE = {
         **BOUND_BY_CONSTANT_FRICTION,
         leave_out=_without_profiles,
     ),
-    "falling_friction": Entry(
+    "falling_friction": EffectEntry(
         "Friction that falls with the speed of slip",
         "falling_friction",
         "an exponential per cell, and a march of its own",
@@ -138,7 +138,7 @@ TABLE = {
         modules=("models.contact.fastsim_falling",),
         usual_value={"floor": 0.4, "decay": 0.6, "speed": 20.0},  # of the size of measured values
     ),
-    "spin": Entry(
+    "spin": EffectEntry(
         "Spin of the wheel about the contact's normal",
         "creepage.spin",
         "nothing: the third column of the same creepages",

@@ -8,12 +8,12 @@ lean, controls that act, external forces.
 from typing import Any
 
 from models.core.errors import InputError
-from models.core.scene_effects import Entry, Table
+from models.core.scene_effects import EffectEntry, Table
 
 
 def _manoeuvre_effect(
     manoeuvre_key: str, description: str, cost: str, work_counts: dict[str, int], usual_value: Any
-) -> Entry:
+) -> EffectEntry:
     """Returns an effect that is present where a key of any manoeuvre has a value; it is left out of all manoeuvres, or
     put into all.
     """
@@ -36,7 +36,9 @@ def _manoeuvre_effect(
             manoeuvre[manoeuvre_key] = usual_value
 
     key_path = f"manoeuvres.NAME.{manoeuvre_key}"
-    return Entry(description, key_path, cost, work_counts, is_present=is_present, leave_out=leave_out, put_in=put_in)
+    return EffectEntry(
+        description, key_path, cost, work_counts, is_present=is_present, leave_out=leave_out, put_in=put_in
+    )
 
 
 CAR_ALONE, CAR_WITH_CARAVAN = "r19_free", "r19_caravan"
@@ -91,7 +93,7 @@ TABLE = {
     "rough_road": _manoeuvre_effect(
         "rough", "A rough road under all tyres, of plane waves", "a cosine per wave, tyre and call", {"waves": 48}, True
     ),
-    "measured_drive": Entry(
+    "measured_drive": EffectEntry(
         "The steer angle and the speed of a measured drive, with the torques that this speed takes",
         "manoeuvres.NAME.measured",
         "about four marches of the manoeuvre in MuJoCo, once, that seek the torques",
@@ -99,14 +101,14 @@ TABLE = {
         leave_out=_without_measured_drive,
         modules=("models.measured.drive", "models.systems.handling.following"),
     ),
-    "inclined_wheels": Entry(
+    "inclined_wheels": EffectEntry(
         "Wheels that lean, left and right ones mirrored",
         "tyres.inclination",
         "nothing: the same forces at an angle, with spin",
         {"leaning wheels": 4},
         usual_value=0.02,
     ),
-    "trailer": Entry(
+    "trailer": EffectEntry(
         "Bodies that the vehicle tows by a hitch, on springs and wheels of their own",
         "vehicle.file",
         "the coordinates of its hitch, wheels and spins, and a tyre per wheel",

@@ -5,7 +5,7 @@
 from typing import Any
 
 from models.core.errors import InputError
-from models.core.scene_effects import Entry, Table
+from models.core.scene_effects import EffectEntry, Table
 
 
 def _selected_effect(
@@ -16,7 +16,7 @@ def _selected_effect(
     usual_value: str,
     value_without: str | None,
     **entry_fields: Any,
-) -> Entry:
+) -> EffectEntry:
     """Returns an effect that is selected by the value of a scene key: ``usual_value`` with the effect,
     ``value_without`` without it; None removes the key.
 
@@ -39,7 +39,7 @@ def _selected_effect(
     def put_in(scene_tables: Table, scene: Any) -> None:
         scene_tables.setdefault(name, {})[key] = usual_value
 
-    return Entry(
+    return EffectEntry(
         description,
         key_path,
         cost,
@@ -128,7 +128,7 @@ TABLE = {
         "hub",
         "inertial",
     ),
-    "virtual_measurement": Entry(
+    "virtual_measurement": EffectEntry(
         "Forces and angles of a virtual measurement on two tracks of a random road",
         "road",
         "a run of the whole vehicle on its tyres before the others",

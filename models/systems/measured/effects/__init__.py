@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from models.core.errors import InputError
-from models.core.scene_effects import Entry, Table
+from models.core.scene_effects import EffectEntry, Table
 
 
 def _transducer_effect(
     fault_key: str, description: str, cost: str, usual_value: dict[str, Any], **work_counts: int
-) -> Entry:
+) -> EffectEntry:
     """Returns an effect of virtual transducers that is present where a key of [virtual.faults] has a value. Measured
     files cannot have it, as their faults are their own.
     """
@@ -28,14 +28,14 @@ def _transducer_effect(
 
     faulty = {name.replace("_", " "): count for name, count in work_counts.items()}
     needs = ("virtual_measurement",)
-    return Entry(
+    return EffectEntry(
         description, f"virtual.faults.{fault_key}", cost, faulty, needs, why=why, is_present=is_present, put_in=put_in
     )
 
 
 def _stabiliser_effect(
     stabiliser_method: str, description: str, cost: str, counted_item: str, needed_modules: tuple[str, ...] = ()
-) -> Entry:
+) -> EffectEntry:
     """Returns the effect of a stabiliser method. Without it roll and pitch are not stabilised, as the other method
     costs more.
     """
@@ -43,7 +43,7 @@ def _stabiliser_effect(
     def leave_out(scene_tables: Table, scene: Any) -> None:
         scene_tables.setdefault("stabilise", {})["method"] = "none"
 
-    return Entry(
+    return EffectEntry(
         description,
         "stabilise.method",
         cost,
@@ -97,7 +97,7 @@ TABLE = {
         {"force": 20.0},
         faulty_channels=12,
     ),
-    "own_clocks": Entry(
+    "own_clocks": EffectEntry(
         "Clocks of files that are shifted or too fast",
         "files.0.offset",
         "signals are moved to one clock by interpolation",
@@ -125,7 +125,7 @@ TABLE = {
         {"force": 8.0, "moment": 1.0, "angle": 1.75e-3, "angular rate": 5e-3},
         faulty_channels=29,
     ),
-    "virtual_measurement": Entry(
+    "virtual_measurement": EffectEntry(
         "A virtual measurement in place of files",
         "virtual",
         "a run of the whole vehicle on its tyres, written as a file and read again",

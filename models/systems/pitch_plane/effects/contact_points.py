@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.signals import Sampled, Smooth, Stacked
+from models.core.signals import SampledSignal, Smooth, StackedSignal
 from models.core.strict import Strict
 from models.engines.assembly import Assembly, Channels
 
@@ -46,8 +46,8 @@ def contact_points(vehicle_assembly: Assembly, times: np.ndarray, states: np.nda
     under the first force.
     """
     p, signal = vehicle_assembly.parameters, vehicle_assembly.input
-    forces = signal.parts[0] if isinstance(signal, Stacked) else signal
-    assert isinstance(forces, Sampled | Smooth)
+    forces = signal.parts[0] if isinstance(signal, StackedSignal) else signal
+    assert isinstance(forces, SampledSignal | Smooth)
     pieces = forces.polynomials()
     tyres = (("front", p.k1, p.d1), ("rear", p.k2, p.d2))
     return {

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from models.core.noise import normal_samples
-from models.core.signals import Sampled, Smooth
+from models.core.signals import SampledSignal, Smooth
 from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly
 from models.systems.pitch_plane.sampling import PATH_FIELD, SEED_FIELD
@@ -30,7 +30,7 @@ class Parameters(Strict):
 def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     """Returns the assembly with noise added to both wheel forces."""
     signal = vehicle_assembly.input
-    assert isinstance(signal, Sampled | Smooth)
+    assert isinstance(signal, SampledSignal | Smooth)
     noisy = signal.values + parameters.deviation * normal_samples(
         parameters.seed, parameters.path, len(signal.values), 2
     )

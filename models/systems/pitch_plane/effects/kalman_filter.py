@@ -20,8 +20,8 @@ from pydantic import Field
 from models.core.assumptions import Assumption, Watched
 from models.core.errors import InputError
 from models.core.result import Result
-from models.core.signals import Sampled, Smooth
-from models.core.steps import divides
+from models.core.signals import SampledSignal, Smooth
+from models.core.steps import step_divides
 from models.core.strict import Strict, quantity
 from models.core.tables import RADIANS, RADIANS_PER_SECOND
 from models.drift.growth import pitch_spring, rigid_pitch
@@ -103,7 +103,7 @@ def extend(vehicle_assembly: Assembly, parameters: Any) -> Assembly:
     stiffness, damping = pitch_spring(vehicle_assembly.parameters, parameters.bandwidth, parameters.damping_ratio)
     moment = guide.values @ np.array([[stiffness], [damping]]) + guide.inertia_moment[:, None]
     sprung = vehicle_assembly.with_spring(PitchSpring("chassis", stiffness, damping))
-    guided = sprung.with_moment(Sampled(moment, guide.period, held=False))
+    guided = sprung.with_moment(SampledSignal(moment, guide.period, held=False))
     return replace(
         guided,
         outputs=(*guided.outputs, partial(_guiding_channels, guide, stiffness, damping)),
@@ -152,7 +152,7 @@ def guide_of(vehicle_assembly: Assembly, filter_parameters: Parameters) -> Guidi
         vehicle_assembly.input,
         vehicle_assembly.parameters,
     )
-    assert isinstance(forces, Sampled | Smooth)
+    assert isinstance(forces, SampledSignal | Smooth)
     signal = type(forces).__name__, forces.values, forces.period, forces.held
     kind = vehicle_assembly.mode, vehicle_assembly.vehicle.geometry, vehicle_assembly.scene.run.duration
     key = pickle.dumps((kind, p_vehicle.array(), vehicle_assembly.initial, signal, measured, filter_parameters))
@@ -222,7 +222,7 @@ def _measurement(vehicle_assembly: Assembly, filter_parameters: Parameters) -> "
             raise InputError(path, f"column {name!r}", None, "holds no number at all: leave its deviation out")
     check_end(scene, f"{key_path}.file", filter_parameters.file, len(values) * period)
     assert vehicle_assembly.input is not None and vehicle_assembly.input.period is not None
-    if not divides(*sorted((period, vehicle_assembly.input.period))):
+    if not step_divides(*sorted((period, vehicle_assembly.input.period))):
         raise InputError(
             scene.file,
             f"{key_path}.file",

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.signals import Smooth, Stacked
+from models.core.signals import Smooth, StackedSignal
 from models.core.smoothing import low_passed
 from models.core.strict import Strict, quantity
 from models.core.tables import RADIANS
@@ -69,7 +69,7 @@ def prescribe(
     motion = Smooth(values, period, derivatives=2, degree=5)
     check_end(scene, f"effects.{effect_name}.file", motion_parameters.file, motion.end)
     assert vehicle_assembly.input is not None
-    guided = vehicle_assembly.with_input(drive_mode, Stacked((vehicle_assembly.input, motion)))
+    guided = vehicle_assembly.with_input(drive_mode, StackedSignal((vehicle_assembly.input, motion)))
     guided.initial[[*PRESCRIBED_COORDINATES[drive_mode], *(4 + i for i in PRESCRIBED_COORDINATES[drive_mode])]] = (
         motion.at(0.0)[: 2 * len(units_of_columns)]
     )

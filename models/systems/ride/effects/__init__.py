@@ -4,12 +4,12 @@ from collections.abc import Callable
 from typing import Any
 
 from models.core.errors import InputError
-from models.core.scene_effects import Entry, Table
+from models.core.scene_effects import EffectEntry, Table
 
 
-def _vehicle_effect(description: str, cost: str, is_present: Callable[[Any], bool]) -> Entry:
+def _vehicle_effect(description: str, cost: str, is_present: Callable[[Any], bool]) -> EffectEntry:
     """Returns an effect that belongs to the vehicle file, so that only another vehicle file leaves it out."""
-    return Entry(description, "vehicle.file", cost, is_present=is_present, leave_out=_keep_vehicle)
+    return EffectEntry(description, "vehicle.file", cost, is_present=is_present, leave_out=_keep_vehicle)
 
 
 def _keep_vehicle(scene_tables: Table, scene: Any) -> None:
@@ -86,7 +86,7 @@ TABLE = {
         "a product per bushing, and the fastest modes of the vehicle",
         _has_omissions_of_kind("bushings"),
     ),
-    "curves": Entry(
+    "curves": EffectEntry(
         "Curves and friction of springs and dampers, beyond their slopes at rest",
         "vehicle.small_motion",
         "runs in time by an engine in place of one covariance",
@@ -95,7 +95,7 @@ TABLE = {
         is_present=_has_omissions_of_kind("curves"),
         leave_out=_straighten_curves,
     ),
-    "delay": Entry(
+    "delay": EffectEntry(
         "The delay from front to rear: every axle meets at once what the first one meets",
         "road.front_rear",
         "a filter of the road per axle",
@@ -114,7 +114,7 @@ TABLE = {
         "two states per freedom",
         _has_omissions_of_kind("freedoms"),
     ),
-    "gravity_and_preload": Entry(
+    "gravity_and_preload": EffectEntry(
         "Gravity, and the preload of the springs that carry the bodies",
         "vehicle.operating_point",
         "a stiffness per preloaded spring",
@@ -122,7 +122,7 @@ TABLE = {
         usual_value="loaded",
         is_present=lambda scene: scene.vehicle.operating_point == "loaded",
     ),
-    "measured_road": Entry(
+    "measured_road": EffectEntry(
         "A road that is fitted to a measured one",
         "road.file",
         "a fit before all, no more in the runs",
@@ -135,14 +135,14 @@ TABLE = {
         "a product per mount, and the freedoms of what it carries",
         _has_omissions_of_kind("mounts"),
     ),
-    "second_corner": Entry(
+    "second_corner": EffectEntry(
         "The road's second corner: its filters of second order become those of first order",
         "road.cutoff",
         "a state more per filter of the road",
         {"states": 4},
         usual_value=20.0,
     ),
-    "second_track": Entry(
+    "second_track": EffectEntry(
         "The second track: left and right wheels of an axle meet the same height",
         "road.left_right",
         "a second filter of the road per axle",
@@ -159,7 +159,7 @@ TABLE = {
         "a product per tyre; without a second corner white noise at the outputs",
         _has_omissions_of_kind("tyre_damping"),
     ),
-    "varying_speed": Entry(
+    "varying_speed": EffectEntry(
         "A speed that varies along the road",
         "drive",
         "a covariance integrated in time instead of the stationary solution",
@@ -167,7 +167,7 @@ TABLE = {
         modules=("models.ride.varying_speed",),
         leave_out=_hold_mean_speed,
     ),
-    "weighting": Entry(
+    "weighting": EffectEntry(
         "Outputs weighted for people, by ISO 2631-1",
         "weighting",
         "eight states per weighted output by Wk, six by Wd",

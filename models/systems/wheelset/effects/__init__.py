@@ -8,12 +8,12 @@ from collections.abc import Callable
 from typing import Any
 
 from models.core.errors import InputError
-from models.core.scene_effects import Entry, Table
+from models.core.scene_effects import EffectEntry, Table
 
 
 def _parameter_effect(
     description: str, parameter_keys: tuple[str, ...], cost: str, work_counts: dict[str, int], **entry_fields: Any
-) -> Entry:
+) -> EffectEntry:
     """Returns an effect that is present where any of some wheelset parameters is above zero. Its usual values are the
     parameters of CHOSEN_WHEELSET.
     """
@@ -37,7 +37,7 @@ def _parameter_effect(
 
         return float(getattr(CHOSEN_WHEELSET, parameter_key))
 
-    return Entry(
+    return EffectEntry(
         description,
         f"wheelset.override.{parameter_keys[0]}",
         cost,
@@ -81,7 +81,7 @@ TABLE = {
         "one product per wheel and call",
         {"contact damping": 1},
     ),
-    "fastsim": Entry(
+    "fastsim": EffectEntry(
         "Creep forces that friction bounds, by FASTSIM",
         "contact.law",
         "a net of cells per strip and call, about 20 microseconds",
@@ -112,7 +112,7 @@ TABLE = {
         {"springs": 3},
         in_engines=ENGINE_COUNTS,
     ),
-    "profiles": Entry(
+    "profiles": EffectEntry(
         "Measured cross-sections in place of cones on round heads",
         "profiles",
         "tables of contact places by lateral displacement, made once",
