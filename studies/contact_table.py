@@ -54,11 +54,11 @@ def summary_lines(
         return [f"  no rows in {file_name}"]
     sound = ", all of them sound" if row_count > 1 else ", sound"
     state = f"; {wrong_row_count:,} of them wrong, see their status" if wrong_row_count else sound
-    row_time_text = f", {duration(computing_seconds / row_count)} a row" if row_count > 1 else ""
+    row_time_text = f", {duration_text(computing_seconds / row_count)} a row" if row_count > 1 else ""
     twice = " twice for the error of cells" if has_errors else ""
     return [
         f"  {row_count:,} row{'s' * (row_count > 1)} of {file_name}{state}",
-        f"  {duration(computing_seconds)}{row_time_text}, once: reading, forces{twice}, writing",
+        f"  {duration_text(computing_seconds)}{row_time_text}, once: reading, forces{twice}, writing",
     ]
 
 

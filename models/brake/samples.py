@@ -20,7 +20,7 @@ from models.brake.brake import WheelBrakes
 from models.brake.plane_records import REPORT_SIZE, PlaneMotion
 from models.brake.plane_step import copy_row
 from models.brake.pressure import AirState, BrakeChambers, advance_by_pressures, advance_by_valves
-from models.machine.compiled import inlined, named_closure, njit
+from models.machine.compiled import closure_with_unique_name, inlined, njit
 
 
 class RecordedRow(NamedTuple):

@@ -22,7 +22,7 @@ from models.brake.plane_records import TURNING_ROW, WheelStates, report_of
 from models.brake.plane_step import fill_tyre_report, set_slip_angle, time_of_rest
 from models.brake.surfaces import WheelSurfaces, fill_surfaces_under_wheels
 from models.brake.wheel_step import BrakedWheel, WheelStepInput
-from models.machine.compiled import inlined, lean, named_closure, njit
+from models.machine.compiled import closure_with_unique_name, inlined, lean, njit
 from models.machine.stack import array, at, beyond, doubles, row, start
 from models.multibody.forces import (
     AXLE,

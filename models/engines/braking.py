@@ -16,7 +16,7 @@ from models.brake.plane_records import PlaneMotion, WheelReport
 from models.brake.plane_vehicle import PlaneVehicle
 from models.brake.samples import samples_with_step
 from models.brake.surfaces import VehicleOnRoad
-from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.free_vehicle import FreeModel, LoadedVehicle, free_model
 from models.machine.compiled import lean
 from models.machine.stack import array, at, beyond
 from models.vehicles.spatial import Body, SpatialVehicle

@@ -182,15 +182,15 @@ def march_wheelset(
 ):
     """Integrate from ``wheelset_state`` by RK4; the state is modified. Returns the number of steps made.
 
-    parameters : of ``WheelsetEquations``; time_steps : length (s) of a step, count of steps, and after how many steps one
-    goes into path and reports; contact_workspace, runge_kutta_arrays : arrays of the caller, to which no reference is held, which saves
-    5 % of the time of a bare wheelset."""
+    parameters : of ``WheelsetEquations``; time_steps : length (s) of a step, count of steps, and after how many steps
+    one goes into path and reports; contact_workspace, runge_kutta_arrays : arrays of the caller, to which no reference
+    is held, which saves 5 % of the time of a bare wheelset."""
     (speed, plain_body, plain_tuples), (step, count, stride), (total, rate, stage_state, no_report) = (
         parameters,
         time_steps,
         runge_kutta_arrays,
     )
-    body, rails = Body(*plain_body), rails_from_tuples(plain_tuples)
+    body, rails = WheelsetBody(*plain_body), rails_from_tuples(plain_tuples)
     for i in range(count + 1):
         row = i // stride
         for stage in range(4):  # one call of the rates, or it is compiled four times
@@ -382,11 +382,13 @@ class WheelsetEquations:
         return states, contacts
 
     def march(self, state: Array, time_steps: tuple[float, int, int], states: Array, contacts: Array) -> int:
-        """Number of steps that the compiled ``march`` makes before the wheelset leaves the track; ``state`` (10,) is
+        """Number of steps that the compiled ``march_wheelset`` makes before the wheelset leaves the track; ``state`` (10,) is
         modified, ``states`` and ``contacts`` are filled."""
-        stages = Stages(*np.empty((3, STATE_COUNT)), NO_REPORT)
+        stages = RungeKuttaArrays(*np.empty((3, STATE_COUNT)), NO_REPORT)
         return int(
-            march(state, self.parameters, time_steps, states, contacts, workspace_for(self.rails.profile), stages)
+            march_wheelset(
+                state, self.parameters, time_steps, states, contacts, workspace_for(self.rails.profile), stages
+            )
         )
 
     def check(self, path_states: WheelsetPath, time_step: float, storing_stride: int) -> None:

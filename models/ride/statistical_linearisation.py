@@ -20,7 +20,7 @@ from models.ride.covariance import StationaryCovariance, stationary_covariance
 from models.ride.excited import DelayedSystem, vehicle_with_road
 from models.ride.gaussian_laws import linearised_rate_law, linearised_travel_law
 from models.road.excitation import RoadExcitation
-from models.vehicles.linear_vehicle import LinearVehicle, Output, WheelPosition
+from models.vehicles.linear_vehicle import LinearOutput, LinearVehicle, WheelPosition
 from models.vehicles.spatial import PartKind, PartOutput, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import Gains, linearise
 

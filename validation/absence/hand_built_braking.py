@@ -19,7 +19,7 @@ from models.machine.compiled import inlined, lean, njit
 from models.machine.timing import interleave, paired_ratio
 from models.systems.braking.march import BrakingPath
 from models.systems.braking.procedures import controller_of, vehicle_and_start_state
-from models.tyre.tyre_table import TableCell, Tables, cell_and_share, lateral_adhesion
+from models.tyre.tyre_table import StackedTyreTables, TableCell, cell_and_share, lateral_adhesion
 from validation.absence.braking import STOP
 from validation.absence.of_systems import bare_scene
 

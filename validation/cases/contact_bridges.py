@@ -16,7 +16,7 @@ from models.contact.hertz import by_approach
 from models.contact.inputs import Array
 from models.contact.patches import separate_patches
 from models.contact.simplified_theory import solve_normal_contact, solve_rolling_contact
-from models.engines.contact_bridge import FREEDOM, FREEDOMS, Theory, Wheels, add_forces, forces
+from models.engines.contact_bridge import FREEDOM, FREEDOMS, RailWheels, Theory, add_forces, forces
 from models.engines.contact_bridge_exudyn import ROUTES, RailWheelSystem, WheelForceFunctions
 from models.engines.contact_bridge_mujoco import empty_law, python_law, rail_wheel_model
 from models.engines.mujoco_callback import kernel_law
@@ -303,7 +303,7 @@ def _bridge_cost_rows(measured_times: MeasuredContactTimes) -> list[Row]:
         what = (
             f"{ENGINE_NAMES[setup.engine]}, {setup.integrator}: {what}, step with FASTSIM at four wheels (21 x 21, "
             "native, "
-            f"{spelled(step, 1e6)} us), 95 % interval {low:.3f} to {high:.3f}"
+            f"{interval_text(step, 1e6)} us), 95 % interval {low:.3f} to {high:.3f}"
         )
         rows.append(Observed(name, SYSTEM, what, value, "").aim(bound, TIMING_NOTE))
     return rows

@@ -146,7 +146,7 @@ def _no_critical_speed_row(wheelset_name: str, wheelset: Wheelset, expected_outc
     outcomes = set()
     for engine in IMPLEMENTATION_MODULES:
         try:
-            outcomes.add(f"{critical_speed(wheelset, partial(largest_growth, equations_class(engine))):.3g} m/s")
+            outcomes.add(f"{critical_speed(wheelset, partial(largest_growth_rate, equations_class(engine))):.3g} m/s")
         except NoCriticalSpeed as error:
             outcomes.add("unstable" if error.unstable else "stable")
     return behaviour_row(
