@@ -321,8 +321,8 @@ def _rigidity_text(readings_quality: RigidFitQuality) -> str:
         )
     if readings_quality.suspect_sensor:
         return (
-            f"{share} (allowed: {100 * UNEXPLAINED_SHARE_LIMIT:g} %): {readings_quality.suspect_sensor!r} does not move "
-            "with the body and is left out"
+            f"{share} (allowed: {100 * UNEXPLAINED_SHARE_LIMIT:g} %): {readings_quality.suspect_sensor!r} does "
+            "not move with the body and is left out"
         )
     return (
         f"{share} (allowed: {100 * UNEXPLAINED_SHARE_LIMIT:g} %): the body or a mount gives way and no "
@@ -385,7 +385,8 @@ def _figure(readings_source: ReadingsSource, shown_results: Results, figure_path
             )
     axes["misfit"].plot(reading_times, readings_source.readings_quality.unexplained_rms, color=GREY, linewidth=0.4)
     axes["misfit"].set_title(
-        f"Readings that no rigid motion explains, {100 * readings_source.quality.unexplained_share:.2g} % [m/s²]"
+        f"Readings that no rigid motion explains, "
+        f"{100 * readings_source.readings_quality.unexplained_share:.2g} % [m/s²]"
     )
     axes["misfit"].set_xlabel("time [s]")
     legend_below(figure, axes["pitch error" if readings_source.true_motion else "pitch"], column_count=3)

@@ -376,18 +376,21 @@ class WheelsetEquations:
         """States and contacts at every ``storing_stride``-th step of a path; ``wheelset_state`` (10,) is modified."""
         row_count = step_count // storing_stride + 1
         states, contacts = np.empty((row_count, STATE_COUNT)), self.empty_contacts(row_count)
-        steps_done = self.march_wheelset(wheelset_state, (time_step, step_count, storing_stride), states, contacts)
+        steps_done = self.march_with_reports(wheelset_state, (time_step, step_count, storing_stride), states, contacts)
         if steps_done < step_count:
             raise RunFailed("wheelset", "leaves the track", steps_done * time_step)
         return states, contacts
 
-    def march(self, state: Array, time_steps: tuple[float, int, int], states: Array, contacts: Array) -> int:
-        """Number of steps that the compiled ``march_wheelset`` makes before the wheelset leaves the track; ``state`` (10,) is
-        modified, ``states`` and ``contacts`` are filled."""
-        stages = RungeKuttaArrays(*np.empty((3, STATE_COUNT)), NO_REPORT)
+    def march_with_reports(
+        self, wheelset_state: Array, time_steps: tuple[float, int, int], states: Array, contacts: Array
+    ) -> int:
+        """Number of steps that ``march_wheelset`` makes before the wheelset leaves the track; ``wheelset_state`` (10,)
+        is modified, ``states`` and ``contacts`` are filled."""
+        total, rate, stage_state = np.empty((3, STATE_COUNT))
+        stages = RungeKuttaArrays(total, rate, stage_state, NO_REPORT)
         return int(
             march_wheelset(
-                state, self.parameters, time_steps, states, contacts, workspace_for(self.rails.profile), stages
+                wheelset_state, self.parameters, time_steps, states, contacts, workspace_for(self.rails.profile), stages
             )
         )
 

@@ -79,11 +79,13 @@ def run_for_kernels(scene_name: str, key_changes: list[str], engine: str, with_e
 
 def compile_fastsim() -> None:
     """Compile FASTSIM for many contacts, which a wheelset's equations call."""
-    from models.contact.fastsim_many import forces
-    from models.contact.fastsim_records import CONTACT, FORCES, Cells, Strips
+    from models.contact.fastsim_many import fill_contact_forces
+    from models.contact.fastsim_records import CONTACT, FORCES, GridStrips, StripCells
 
     strip_values, cell_values = np.empty((4, 0)), np.empty((5, 0))
-    forces(np.empty(0, CONTACT), Strips(*strip_values), Cells(*cell_values, 1.0), 0, 0, np.empty(0, FORCES))
+    fill_contact_forces(
+        np.empty(0, CONTACT), GridStrips(*strip_values), StripCells(*cell_values, 1.0), 0, 0, np.empty(0, FORCES)
+    )
 
 
 def compile_free_vehicle_forces() -> None:

@@ -320,7 +320,8 @@ def _computing_time_rows(seconds_by_program: dict[str, list[float]]) -> list[Row
             "contact_simplified.time.exact",
             SYSTEM,
             "ratio of the time of the exact normal problem at the same fineness, "
-            f"{seconds_text(seconds_by_program['exact'])}, to that of this method, {seconds_text(seconds_by_program['press'])}",
+            f"{seconds_text(seconds_by_program['exact'])}, to that of this method, "
+            f"{seconds_text(seconds_by_program['press'])}",
             _computing_time_ratio(seconds_by_program, "exact", "press"),
             "",
         ).beside("", "what the theory saves", "none"),

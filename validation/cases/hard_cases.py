@@ -79,9 +79,9 @@ def cases_of_quick_run(cases_with_family: Sequence[tuple[str, HardCase]]) -> lis
 def _outcome_row(hard_case: HardCase, implementation_name: str, case_outcome: CaseOutcome) -> Row:
     """Row of a hard case: its error if a result is expected and given, else its outcome."""
     name = hard_case.name.replace(",", "").replace(" ", "-")
-    id = f"hard.{name}.{'any' if hard_case.without_engine else implementation_name}"
+    id = f"hard.{name}.{'any' if hard_case.is_without_engine else implementation_name}"
     quantity = (
-        f"{hard_case.name}{'' if hard_case.without_engine else f', {implementation_name}'}: {hard_case.exact_answer}"
+        f"{hard_case.name}{'' if hard_case.is_without_engine else f', {implementation_name}'}: {hard_case.exact_answer}"
     )
     if hard_case.wanted_outcome(implementation_name) == "right" and case_outcome.error is not None:
         error, judged = case_outcome.error, hard_case.independence(implementation_name)

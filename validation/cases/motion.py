@@ -78,7 +78,7 @@ def _clean_reading_rows(arrangement_name: str) -> list[Row]:
     )
     alpha = float(np.abs(angular_acceleration(spins, PATH.rates) - PATH.alpha).max())
     squares = (rates_up_to_sign(spins) @ array.principal_axes) ** 2 - (PATH.rates @ array.principal_axes) ** 2
-    what = f"sensors: {arrangement_name}{', formula for a plane' if array.planar else ''}"
+    what = f"sensors: {arrangement_name}{', formula for a plane' if array.is_planar else ''}"
     why = "rounding of readings of 20 m/s^2; nothing is integrated"
     shown = (
         ("alpha", "error of the angular acceleration from clean readings", alpha, "rad/s^2"),
@@ -247,7 +247,7 @@ def _engine_rows(engine_name: str, duration: float) -> list[Row]:
         behaviour_row(
             f"motion.bracket.{engine_name}",
             SYSTEM,
-            f"six sensors, of which a bracket of 30 Hz carries one, {engine_name}: {100 * loose.share:.2g} "
+            f"six sensors, of which a bracket of 30 Hz carries one, {engine_name}: {100 * loose.unexplained_share:.2g} "
             "% fits no rigid body",
             f"loose: {loose.suspect_sensor}" if not loose.rigid else "rigid",
             "loose: battery",

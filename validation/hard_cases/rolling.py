@@ -253,7 +253,7 @@ def too_large_step_naive_result(work_folder: Path) -> str:
     for step in (TIME_STEP, TIME_STEP / 8.0):
         states, contacts = np.empty((1, eq.STATE_COUNT)), equations.empty_contacts(1)
         state = displaced_state(equations, **LANDING)
-        equations.march_wheelset(state, (step, round(0.1 / step), 1_000_000), states, contacts)
+        equations.march_with_reports(state, (step, round(0.1 / step), 1_000_000), states, contacts)
         ends.append(state)
     return f"displaced by {1e3 * abs(ends[1][eq.Y] - ends[0][eq.Y]):.2g} mm more or less after 0.1 s"
 

@@ -146,8 +146,8 @@ def violates_friction(car_drive: SimulatedDrive) -> bool:
 
 def energy_balance_error(car_drive: SimulatedDrive) -> float:
     """Error of the energy balance over a run with equal steps, divided by the initial energy."""
-    run_times, ends = car_drive.car_drive.times, [0, -1]
-    run_ends = Trajectory(run_times[ends], car_drive.car_drive.states[ends])
+    run_times, ends = car_drive.run.times, [0, -1]
+    run_ends = Trajectory(run_times[ends], car_drive.run.states[ends])
     first_energy, last_energy = drive_energy(
         SimulatedDrive(car_drive.handling, run_ends, car_drive.tyres[ends], car_drive.ledger[ends])
     )

@@ -102,7 +102,7 @@ def run(
         result.times[-1],
         verdict_limits or AcceptanceLimits(),
         until,
-        stated_pitch_uncertainty=score.stated_pitch_uncertainty(result),
+        pitch_uncertainty=score.stated_pitch_uncertainty(result),
     )
     if run_settings.effect is None and verdict.word == "accepted":
         verdict = _verdict_with_measured_pitch(run_settings, result, verdict_limits or AcceptanceLimits(), verdict)

@@ -136,7 +136,7 @@ def compare_stabilisers(
         def report_progress(progress_text: str, road_share: float, completed_share: int = i) -> None:
             report_study_progress(progress_text, (completed_share + road_share) / (len(benches) + 1))
 
-        rows += bench.score(engines[0], () if i else engines[1:], failed, report_progress)
+        rows += bench.score_stabilisers(engines[0], () if i else engines[1:], failed, report_progress)
     return benches, rows, failed
 
 

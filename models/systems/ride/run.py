@@ -71,8 +71,8 @@ def run(
     progress : called during such a run. error : whether errors are estimated, by further solutions or runs. Assumptions
     are always checked.
 
-    The result's detail is a ``VarianceSweep``, a ``VaryingSpeedDeviations``, a ``NonlinearRide`` or, for an engine in time, a
-    ``EngineRide``.
+    The result's detail is a ``VarianceSweep``, a ``VaryingSpeedDeviations``, a ``NonlinearRide`` or, for an engine in
+    time, an ``EngineRide``.
     """
     engine = engine or "reference"
     with scene_errors(scene):

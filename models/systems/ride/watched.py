@@ -59,8 +59,8 @@ def watched_vehicle(linear_vehicle: LinearVehicle, vehicle: SpatialVehicle, spee
     speed (m/s).
     """
     watched = replace(vehicle, outputs=watched_outputs(vehicle))
-    rows = linearise(watched, speed).linear_outputs if vehicle.limits else linear_outputs(watched, Kinematics(watched))
-    return replace(linear_vehicle, linear_outputs=(*rows, *_slip_outputs(vehicle, rows, speed)))
+    rows = linearise(watched, speed).outputs if vehicle.limits else linear_outputs(watched, Kinematics(watched))
+    return replace(linear_vehicle, outputs=(*rows, *_slip_outputs(vehicle, rows, speed)))
 
 
 def _slip_outputs(vehicle: SpatialVehicle, outputs: tuple[LinearOutput, ...], speed: float) -> Iterator[LinearOutput]:

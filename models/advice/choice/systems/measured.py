@@ -27,7 +27,7 @@ def computed_quantities(scene: MeasuredScene, engine: str, with_error_estimate: 
     if scene.vehicle.file is None:
         allowed = "a recording is priced and its effects chosen for a vehicle in space: name vehicle.file"
         raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)
-    result = run(scene, engine, with_error_estimate=with_error_estimate)
+    result = run(scene, engine, error=with_error_estimate)
     exam: RecordingAnalysis = result.detail
     assert exam.outcome is not None
     forces = [answer for answer in exam.outcome.answers if answer.quantity != "acceleration"]

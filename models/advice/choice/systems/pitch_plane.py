@@ -16,7 +16,7 @@ def computed_quantities(scene: Scene, engine: str, with_error_estimate: bool = F
     """Run the pitch-plane scene and collect the channels of its result."""
     assembly = assembly_of_scene(scene)
     start_time = time.process_time()
-    result = run(scene, engine, assembly=assembly, with_error_estimate=with_error_estimate)
+    result = run(scene, engine, assembly=assembly, error=with_error_estimate)
     seconds = time.process_time() - start_time
     run_counts, states = result.counts(), result.detail.states
     counts = {"steps": run_counts.get("steps", len(states) - 1), "states": states.shape[1]}
