@@ -19,7 +19,8 @@ def on_road(
     road: RoadSurfaces = UNIFORM_ROAD,
     cornering_slope: float = 10.0,
 ) -> VehicleOnRoad:
-    """A vehicle in the plane on a road, all of its wheels with the same tyre. cornering_slope: of its friction (1/rad)."""
+    """A vehicle in the plane on a road, all of its wheels with the same tyre. cornering_slope: slope of its friction
+    at small slip angles (1/rad)."""
     return VehicleOnRoad(plane_vehicle, np.zeros(plane_vehicle.wheels, dtype=int), cornering_slope, tyre_tables, road)
 
 
