@@ -98,86 +98,92 @@ def _timing_of_valid_times(times: np.ndarray, measurement_place: str, signal_nam
     def report(
         check: str, severity: FindingWeight, finding_text: str, finding_size: float, unit: str, times: Iterable[float]
     ) -> None:
-        findings.append(
-            Finding(
-                check,
-                severity,
-                measurement_place,
-                f"{measurement_place}: {finding_text}.",
-                finding_size,
-                unit,
-                signal_names,
-                tuple(map(float, times)),
-            )
-        )
+        text, instants = f"{measurement_place}: {finding_text}.", tuple(map(float, times))
+        findings.append(Finding(check, severity, measurement_place, text, finding_size, unit, signal_names, instants))
 
-    keep, order = np.arange(sample_count), None
-    steps = np.diff(times)
-    rising = steps[steps > 0]
-    if not len(rising):
+    rising_steps = np.diff(times)[np.diff(times) > 0]
+    if not len(rising_steps):
         raise InputError(measurement_place, "time", None, "two samples or more at different times are needed")
     even = even_clock(times)
     if even is not None:
-        repeated_count = sample_count - 1 - len(rising)
-        repeated_text = f", so that {repeated_count} of {sample_count} repeat themselves" if repeated_count else ""
-        report(
-            "time",
-            "note",
-            f"the times are rounded{repeated_text}: "
-            f"an even clock of {1 / even[1]:.9g} Hz explains them all, and is taken with all {sample_count} samples",
-            float(repeated_count),
-            "samples",
-            (times[0], times[-1]),
-        )
+        _report_rounded_times(times, even[1], report)
         return SampleTiming(even[0] + even[1] * np.arange(sample_count), None, even[1], tuple(findings))
-    period = float(f"{_median_step(times, rising):.9g}")
-    if (steps < 0).any():
-        deepest, at = -float(steps.min()), int(np.argmax(steps < -SHUFFLED_PERIODS * period))
-        if deepest > SHUFFLED_PERIODS * period:
-            keep = keep[: at + 1]
-            report(
-                "time",
-                "error",
-                f"the clock goes back by {deepest:.6g} s at {times[at]:.6g} s: there are two "
-                "measurements in the file, which must be taken apart; what follows is left out",
-                deepest,
-                "s",
-                (times[at + 1], times[at]),
-            )
-        else:
-            report(
-                "time",
-                "doubt",
-                f"{np.count_nonzero(steps < 0)} times are earlier than the one before them, by up to "
-                f"{deepest:.3g} s; the samples are put in order",
-                deepest,
-                "s",
-                times[[at, at + 1]],
-            )
-        keep = keep[np.argsort(times[keep], kind="stable")]
-        order = keep
-    repeated = np.diff(times[keep]) == 0
-    if repeated.any():
-        first, count = float(times[keep][1:][repeated][0]), int(np.count_nonzero(repeated))
-        text = f"{count} of {len(keep)} times are there more than once, the first at {first:.6g} s; "
-        if count > REPEATED_TIME_SHARE * len(keep):
-            report(
-                "time",
-                "error",
-                f"{text}no even clock explains them, and without these samples the forces are others: "
-                "export the times with more digits, or mend them",
-                float(count),
-                "samples",
-                (first, first),
-            )
-        else:
-            report("time", "doubt", f"{text}of each the first sample is taken", float(count), "samples", (first, first))
-        keep = keep[np.concatenate(([True], ~repeated))]
-        order = keep
-    kept_times = times[keep]
-    _report_gaps(kept_times, period, report)
-    _report_jitter(kept_times, period, report)
-    return SampleTiming(kept_times, order, period, tuple(findings))
+    period = float(f"{_median_step(times, rising_steps):.9g}")
+    order = _first_of_each_time(times, _ascending_order(times, period, report), report)
+    ascending_times = times[order]
+    _report_gaps(ascending_times, period, report)
+    _report_jitter(ascending_times, period, report)
+    is_as_in_file = np.array_equal(order, np.arange(sample_count))
+    return SampleTiming(ascending_times, None if is_as_in_file else order, period, tuple(findings))
+
+
+def _ascending_order(times: np.ndarray, sampling_period: float, report_finding: ReportFinding) -> np.ndarray:
+    """Indices (m,) of the samples in ascending order of their times (n,). Samples after a clock that began anew are
+    left out, and samples that are late are put in order; both are reported.
+    """
+    order, steps = np.arange(len(times)), np.diff(times)
+    if not (steps < 0).any():
+        return order
+    deepest, at = -float(steps.min()), int(np.argmax(steps < -SHUFFLED_PERIODS * sampling_period))
+    if deepest > SHUFFLED_PERIODS * sampling_period:
+        order = order[: at + 1]
+        report_finding(
+            "time",
+            "error",
+            f"the clock goes back by {deepest:.6g} s at {times[at]:.6g} s: there are two "
+            "measurements in the file, which must be taken apart; what follows is left out",
+            deepest,
+            "s",
+            (times[at + 1], times[at]),
+        )
+    else:
+        report_finding(
+            "time",
+            "doubt",
+            f"{np.count_nonzero(steps < 0)} times are earlier than the one before them, by up to "
+            f"{deepest:.3g} s; the samples are put in order",
+            deepest,
+            "s",
+            times[[at, at + 1]],
+        )
+    return order[np.argsort(times[order], kind="stable")]
+
+
+def _first_of_each_time(times: np.ndarray, order: np.ndarray, report_finding: ReportFinding) -> np.ndarray:
+    """Indices (m,) of the first sample of each time, from the samples' ``order`` by times (n,); repetitions are
+    reported.
+    """
+    repeated = np.diff(times[order]) == 0
+    if not repeated.any():
+        return order
+    first, count = float(times[order][1:][repeated][0]), int(np.count_nonzero(repeated))
+    text = f"{count} of {len(order)} times are there more than once, the first at {first:.6g} s; "
+    if count > REPEATED_TIME_SHARE * len(order):
+        severity: FindingWeight = "error"
+        text += (
+            "no even clock explains them, and without these samples the forces are others: "
+            "export the times with more digits, or mend them"
+        )
+    else:
+        severity, text = "doubt", f"{text}of each the first sample is taken"
+    report_finding("time", severity, text, float(count), "samples", (first, first))
+    return order[np.concatenate(([True], ~repeated))]
+
+
+def _report_rounded_times(times: np.ndarray, sampling_period: float, report_finding: ReportFinding) -> None:
+    """Report that an even clock explains all times (n,) of a file, which are rounded."""
+    sample_count = len(times)
+    repeated_count = sample_count - 1 - int(np.count_nonzero(np.diff(times) > 0))
+    repeated_text = f", so that {repeated_count} of {sample_count} repeat themselves" if repeated_count else ""
+    report_finding(
+        "time",
+        "note",
+        f"the times are rounded{repeated_text}: an even clock of {1 / sampling_period:.9g} Hz explains them all, and "
+        f"is taken with all {sample_count} samples",
+        float(repeated_count),
+        "samples",
+        (times[0], times[-1]),
+    )
 
 
 def _median_step(times: np.ndarray, rising_steps: np.ndarray) -> float:
