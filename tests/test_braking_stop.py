@@ -62,7 +62,7 @@ def test_each_rule_of_a_stop_is_seen_to_break(row, part, value, said):
 
 def test_a_torque_that_drives_is_refused():
     with pytest.raises(InputError, match="brake opposes"):
-        case.braked(
+        case.stop_of_quarter_vehicle(
             case.FRONT_WHEEL,
             case.friction_table("ice")[1],
             case.UNIFORM_ROAD,
@@ -86,5 +86,5 @@ def test_a_brake_that_holds_a_small_wheel_just_at_the_friction_of_a_locked_one()
     quarter, tables = QuarterVehicle(mass=300.0, radius=0.3, spin_inertia=1e-4), stacked_tables([rising])
     locking = 0.9 * quarter.mass * case.GRAVITY * quarter.radius
     for step in (1e-3, 1.3e-2):
-        stop = case.braked(quarter, tables, case.UNIFORM_ROAD, np.full(int(2.2 / step), locking), step, 17.3)
+        stop = case.stop_of_quarter_vehicle(quarter, tables, case.UNIFORM_ROAD, np.full(int(2.2 / step), locking), step, 17.3)
         assert stop.step_of_rest > 0 and stop.distance == pytest.approx(17.3**2 / (2.0 * 0.9 * case.GRAVITY), rel=1e-3)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.core.result import load as load_result
+from models.core.result import load_result
 from models.measured.channel import FileChannel
 from models.measured.formats import open_source
 from models.measured.gaps import without_impossible_values
