@@ -14,8 +14,8 @@ from models.systems.measured.assumptions import assumptions
 from models.systems.measured.channel_map import mapped_signals
 from models.systems.measured.scene import MeasuredRig, MeasuredScene
 from models.systems.measured.virtual import checked_signals as check_virtual
-from models.vehicles.implausible_plane_values import implausible_plane_values
-from models.vehicles.implausible_values import implausible_values
+from models.vehicles.plausible import implausible_values
+from models.vehicles.plausible_plane import implausible_plane_values
 
 MISSING_FORCE_TEXT = "no vertical force is mapped at {}: without it the vehicle falls"
 
