@@ -86,5 +86,7 @@ def test_a_brake_that_holds_a_small_wheel_just_at_the_friction_of_a_locked_one()
     quarter, tables = QuarterVehicle(mass=300.0, radius=0.3, spin_inertia=1e-4), stacked_tables([rising])
     locking = 0.9 * quarter.mass * case.GRAVITY * quarter.radius
     for step in (1e-3, 1.3e-2):
-        stop = case.stop_of_quarter_vehicle(quarter, tables, case.UNIFORM_ROAD, np.full(int(2.2 / step), locking), step, 17.3)
+        stop = case.stop_of_quarter_vehicle(
+            quarter, tables, case.UNIFORM_ROAD, np.full(int(2.2 / step), locking), step, 17.3
+        )
         assert stop.step_of_rest > 0 and stop.distance == pytest.approx(17.3**2 / (2.0 * 0.9 * case.GRAVITY), rel=1e-3)
