@@ -284,7 +284,9 @@ def _summary_of_methods(readings_source: ReadingsSource) -> dict[str, Any]:
         errors_of_methods[method_name] = {
             name: [float(np.abs(error).max()), root_mean_square(error)] for name, error in errors.items()
         }
-    quality_facts = {name: getattr(readings_source.readings_quality, name) for name in ("share", "rigid", "suspect")}
+    quality = readings_source.readings_quality
+    assert quality is not None
+    quality_facts = {"share": quality.unexplained_share, "rigid": quality.rigid, "suspect": quality.suspect_sensor}
     return {"source": readings_source.source_name, **quality_facts, "ways": errors_of_methods}
 
 

@@ -62,7 +62,7 @@ def run(
     options, vehicle = _study_options(scene), vehicle_of(scene)
     speed, road = options.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
     results = {
-        "reference": run_scene(scene, "reference", sampling=options, report_progress=report_progress, error=scene.error)
+        "reference": run_scene(scene, "reference", sampling=options, progress=report_progress, error=scene.error)
     }
     results["reference"].save(output_folder / "nonlinear.nc")
     answer, runs, failed = results["reference"].detail, dict[str, EngineRide](), dict[str, str]()

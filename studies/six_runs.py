@@ -17,12 +17,12 @@ from models.systems.pitch_plane.run import run_with_drift
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.six_runs import (
     DRIFT_OFF_PITCH,
-    SixRunOptions,
     channel_error,
     figures_of_run,
     measurement_and_runs,
     options_of,
 )
+from models.systems.pitch_plane.six_runs import SixRunOptions as Options
 
 ReportProgress = Callable[[str, float], None]
 
@@ -80,7 +80,7 @@ the moment."""
 
 
 def summary_lines(
-    run_rows: list[dict[str, Any]], engines: tuple[str, ...], study_options: SixRunOptions, noise_deviation: float
+    run_rows: list[dict[str, Any]], engines: tuple[str, ...], study_options: Options, noise_deviation: float
 ) -> list[str]:
     """Lines for the screen: a table with a line per run and a column per engine."""
     runs: dict[str, list[dict[str, Any]]] = {}

@@ -16,13 +16,8 @@ from models.core.whole_files import whole_file, write_whole
 from models.drift.score import SECTION_FORCE_CHANNELS
 from models.fatigue.damage import COUNTING_CONVENTION
 from models.systems.pitch_plane.scene import Scene
-from models.systems.pitch_plane.stabilised import (
-    FiguresRow,
-    StabiliserBench,
-    StabiliserOptions,
-    compare_stabilisers,
-    options_of,
-)
+from models.systems.pitch_plane.stabilised import FiguresRow, StabiliserBench, compare_stabilisers, options_of
+from models.systems.pitch_plane.stabilised import StabiliserOptions as Options
 
 ReportProgress = Callable[[str, float], None]
 check = options_of
@@ -72,7 +67,7 @@ def _step_error_text(score_results: Results) -> str:
 
 
 def summary_lines(
-    score_rows: list[FiguresRow], benches_of_roads: list[StabiliserBench], study_options: StabiliserOptions
+    score_rows: list[FiguresRow], benches_of_roads: list[StabiliserBench], study_options: Options
 ) -> list[str]:
     """Lines for the screen: a table of all methods, with a block for each engine and road."""
     lines = [

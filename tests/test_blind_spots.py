@@ -226,7 +226,7 @@ def test_an_array_that_a_function_sees_behind_a_pointer_is_spoiled_at_the_end():
         function = function_definition(
             rewritten_module(source_text(module), module, {"set_joint_forces": PLACE}), "set_joint_forces"
         )
-        assert ast.unparse(function.body[-1]) == f"_scaled_by_audit(array(f, (n,)), {PLACE})"
+        assert ast.unparse(function.body[-1]) == f"_scaled_by_audit(array(f, (coordinate_count,)), {PLACE})"
         assert ast.unparse(function).count("_spoiled_by_audit") == 0
 
 

@@ -264,7 +264,7 @@ def ended():
     ("change", "place"),
     [
         ({"seed": 4}, "scene.effects.force_noise.seed"),
-        ({"override": {"k3": 1.1e5}}, "scene.vehicle.override.k3"),
+        ({"parameter_changes": {"k3": 1.1e5}}, "scene.vehicle.override.k3"),
         ({"interpolation": "held"}, "interpolation"),
     ],
     ids=str,

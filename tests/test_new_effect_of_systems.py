@@ -128,9 +128,9 @@ NEW = {
         900.0,
         '{"all": {"pushes": 1}}',
         """
-    from models.multibody.numbers import Push
+    from models.multibody.numbers import ExternalPush
 
-    wind = Push("body", (0.3, 0.0, 0.8), (0.0, 1.0, 0.0), ((0.0, 0.0), (5e-3, p.force)))
+    wind = ExternalPush("body", (0.3, 0.0, 0.8), (0.0, 1.0, 0.0), ((0.0, 0.0), (5e-3, p.force)))
     return replace(built, pushes=(*built.pushes, wind))
 """,
     ),
@@ -384,7 +384,9 @@ def test_a_new_effect_changes_what_a_price_list_compares(system, new_file):
     new_file(system, NEW[system].name, NEW[system].text)
     scene = bare_scene(system)
     runs = module_of_system(scene)
-    less, more = (runs.computed_quantities(one, runs.ENGINE) for one in (scene, with_effects(scene, NEW[system].name)))
+    less, more = (
+        runs.computed_quantities(one, runs.DEFAULT_ENGINE) for one in (scene, with_effects(scene, NEW[system].name))
+    )
     assert any(np.any(more.quantities[name].cases[0] != own.cases[0]) for name, own in less.quantities.items())
 
 

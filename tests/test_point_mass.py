@@ -54,8 +54,14 @@ def test_paths_follow_the_scheme():
 
 
 def test_what_is_no_point_mass_is_refused():
-    for own in ({"mass": 0.0}, {"damping": -1.0}, {"deviation": -1.0}, {"step": 0.0}, {"damping": np.nan}):
-        values = {"deviation": 1.0, "step": 0.1, **own}
+    for own in (
+        {"mass": 0.0},
+        {"damping_rate": -1.0},
+        {"force_deviation": -1.0},
+        {"time_step": 0.0},
+        {"damping_rate": np.nan},
+    ):
+        values = {"force_deviation": 1.0, "time_step": 0.1, **own}
         with pytest.raises(ValueError, match="point mass: none"):
             continuous_covariance(1.0, **values)
     with pytest.raises(ValueError, match="unstable"):

@@ -100,7 +100,7 @@ def test_empty_borders_do_not_matter_but_an_empty_track_does(tmp_path):
     z[:, :2] = z[13, 4] = np.nan
     grid_file(path, z=z)
     assert read_opencrg(path, "centre").end == pytest.approx(1.0)
-    text = refusal(path, track="left")
+    text = refusal(path, track_name="left")
     assert "cross section 14 (u = 0.65 m), v = 0.75 m = nan" in text
 
 
@@ -215,8 +215,8 @@ def test_absent_files_tracks_and_positions_are_named(tmp_path, good_bytes):
     refusal(tmp_path)
     path = tmp_path / "road.crg"
     path.write_bytes(good_bytes["KDBI"])
-    assert "did you mean 'left'" in refusal(path, track="lefft")
-    assert "= 1.75: the file covers v = -1 to 1 m" in refusal(path, track="left", lateral_offset=1.0)
+    assert "did you mean 'left'" in refusal(path, track_name="lefft")
+    assert "= 1.75: the file covers v = -1 to 1 m" in refusal(path, track_name="left", lateral_offset=1.0)
 
 
 @pytest.mark.parametrize(("length", "increment"), [(1.0, 0.0), (1.0, 5e-4), (1.05, 0.1), (0.2, 0.1), (np.nan, 0.1)])

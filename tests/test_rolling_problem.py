@@ -179,7 +179,7 @@ def test_carter_s_own_limits():
         ((0.3, np.nan, 0.0, 0.0, PAIR), "xi_x"),
         ((0.3, 0.0, np.inf, 0.0, PAIR), "xi_y"),
         ((0.3, 0.0, 0.0, np.nan, PAIR), "spin"),
-        ((0.3, 0.0, 0.0, 0.0, MaterialPair(STEEL, Material(E=3e9, nu=0.4))), "pair"),
+        ((0.3, 0.0, 0.0, 0.0, MaterialPair(STEEL, Material(E=3e9, nu=0.4))), "bodies"),
     ],
 )
 def test_bad_input_is_refused(arguments, place):

@@ -71,10 +71,10 @@ def test_what_it_runs_is_the_scene_in_that_engine(empty_folder, tmp_path_factory
 LATE = """
 import sys
 from pathlib import Path
-from models.contact.fastsim_many import forces
+from models.contact.fastsim_many import fill_contact_forces
 from models.multibody.forces import set_forces
 from studies.command.second_compiler import LATE_KERNELS, load_scene, study_of
-kernel = {"wheelset": forces, "handling": set_forces}[sys.argv[1]]
+kernel = {"wheelset": fill_contact_forces, "handling": set_forces}[sys.argv[1]]
 LATE_KERNELS[sys.argv[1]]()
 signatures = list(kernel.signatures)
 Path("out").mkdir()

@@ -20,7 +20,7 @@ from validation.common.scenes import road_scene
 ROOT = Path(__file__).parents[1]
 WORK = """
 import os, sys, time
-from models.core.waiting import simulation_progress
+from models.core.waiting import report_simulation_progress
 from studies.command.waiting import progress_bar
 begun = time.monotonic()
 def until(seen):
@@ -28,7 +28,7 @@ def until(seen):
         time.sleep(0.05)
 with progress_bar("road: exudyn", "handling") as tell:
     tell("road: exudyn", 0.0)
-    with simulation_progress(lambda: min(0.9, (time.monotonic() - begun) / {0})):
+    with report_simulation_progress(lambda: min(0.9, (time.monotonic() - begun) / {0})):
         until("march")
     import numba
     from numba.core import event

@@ -137,7 +137,9 @@ def fit_all(deviation_function: DeviationFunction, candidates: Mapping[str, Cand
     if not names:
         left = deviation_function({})
         return SubsetFit((), np.empty(0), np.empty((0, 0)), float(np.sum(left**2)), len(left), ())
-    start, lower, scale = (np.array([getattr(c, k) for c in candidates.values()]) for k in ("start", "lowest", "scale"))
+    start, lower, scale = (
+        np.array([getattr(c, k) for c in candidates.values()]) for k in ("start", "lower_bound", "scale")
+    )
     fit = least_squares(
         lambda values: deviation_function(dict(zip(names, values.tolist(), strict=True))),
         start,

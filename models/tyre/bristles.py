@@ -54,29 +54,29 @@ def cornering_stiffness_factor(cell_count: int) -> float:
 
 
 @lean
-def tyre_forces(patch_contacts, sliding_velocities, grid_strips, cell_count, middle_pressure, forces_out):
+def tyre_forces(patch_contacts, sliding_velocities, grid_strips, cell_table, middle_pressure, forces_out):
     """Fill ``forces_out`` (w, 4) with the creep forces fx, fy (N) and moments mz (N m) on w tyres; the last column has
     no meaning. No array is allocated.
 
     patch_contacts (w, 10) : a, b, load, mu, three numbers that are filled in here, and three times 1/k (m^3/N);
     sliding_velocities (w, 4) : velocity on the road along x and y (m/s), turning about its normal (1/s), speed of the
-    tread (m/s); grid_strips, cell_count, middle_pressure : the patch's net as ``FastsimGrid`` holds it.
+    tread (m/s); grid_strips (4, m), cell_table (5, n), middle_pressure : the patch's net as ``FastsimGrid`` holds it.
     """
     w = len(patch_contacts)
     patches, answers = (
         records_at_pointer(start(patch_contacts), w, CONTACT),
         records_at_pointer(start(forces_out), w, FORCES),
     )
-    lines, cell_table = strips_in(grid_strips), cells_in(cell_count, middle_pressure)
+    lines, cells = strips_in(grid_strips), cells_in(cell_table, middle_pressure)
     room, slowest = MarchWorkspace(stack_records(w, SLIP), stack_records(1, BLOCK)), FADING_SPEED
     for i in range(w):
         slowest = min(slowest, sliding_velocities[i, 3])
     _creepages(1.0, patches, sliding_velocities)
-    fill_contact_forces_in_place(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, answers)
+    fill_contact_forces_in_place(patches, lines, cells, THREE_BRISTLES, SECOND_ORDER_MARCH, room, answers)
     if slowest < FADING_SPEED:
         backwards = stack_records(w, FORCES)
         _creepages(-1.0, patches, sliding_velocities)
-        fill_contact_forces_in_place(patches, lines, cell_table, THREE_BRISTLES, SECOND_ORDER_MARCH, room, backwards)
+        fill_contact_forces_in_place(patches, lines, cells, THREE_BRISTLES, SECOND_ORDER_MARCH, room, backwards)
         _blend_directions(sliding_velocities, backwards, answers)
 
 

@@ -16,8 +16,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
-
 from studies.command.asked import load_scene, runs_without_extras, study_module_of
 from studies.command.waiting import CompilationTimer
 
@@ -79,6 +77,8 @@ def run_for_kernels(scene_name: str, key_changes: list[str], engine: str, with_e
 
 def compile_fastsim() -> None:
     """Compile FASTSIM for many contacts, which a wheelset's equations call."""
+    import numpy as np
+
     from models.contact.fastsim_many import fill_contact_forces
     from models.contact.fastsim_records import CONTACT, FORCES, GridStrips, StripCells
 

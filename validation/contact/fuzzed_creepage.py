@@ -111,9 +111,7 @@ def _largest_finite(values: Array) -> float:
     return float(max(0.0, np.where(np.isfinite(values), values, np.inf).max()))
 
 
-def moment_bound(
-    contact_columns: Mapping[str, Any], cell_count: int = 21, traction_bound: BoundShape = "intermediate"
-) -> Array:
+def moment_bound(contact_columns: Mapping[str, Any], cells: int = 21, bound: BoundShape = "intermediate") -> Array:
     """Upper bound (n,) of the spin moment (N m) for contacts with arrays (n,) of semi-axes a, b (m), load (N) and
     friction mu."""
     pure = {
@@ -121,17 +119,15 @@ def moment_bound(
         "xi_y": np.zeros_like(contact_columns["a"]),
         "spin": np.ones_like(contact_columns["a"]),
     }
-    return power_bound({**contact_columns, **pure}, cell_count, traction_bound)
+    return power_bound({**contact_columns, **pure}, cells, bound)
 
 
-def power_bound(
-    contact_columns: Mapping[str, Any], cell_count: int = 21, traction_bound: BoundShape = "intermediate"
-) -> Array:
+def power_bound(contact_columns: Mapping[str, Any], cells: int = 21, bound: BoundShape = "intermediate") -> Array:
     """Upper bound (n,) of the power that friction dissipates, divided by the rolling speed (N). The columns hold a, b,
     load, mu, and creepages xi_x, xi_y, spin."""
     a, b, xi_x, xi_y, spin = (contact_columns[name][:, None, None] for name in ("a", "b", "xi_x", "xi_y", "spin"))
     work = np.zeros(len(contact_columns["a"]))
-    for rows, net in grids_of_ratios(contact_columns["a"] / contact_columns["b"], cell_count, traction_bound):
+    for rows, net in grids_of_ratios(contact_columns["a"] / contact_columns["b"], cells, bound):
         strips, along_strip = net.records
         y, half, part = (values[:, None] for values in (strips.y, strips.half, strips.part))
         along, across = -b[rows] * y, a[rows] * half * along_strip.centre

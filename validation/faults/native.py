@@ -139,7 +139,7 @@ FAULTS = (
     CampaignFault(
         "mounts' axes fixed in the space",
         "Exudyn",
-        attribute_patch(f"{EXUDYN_MODULE}:_Trees._tree", _axes_fixed_in_space),
+        attribute_patch(f"{EXUDYN_MODULE}:_AxisFrameTrees._tree", _axes_fixed_in_space),
     ),
 )
 

@@ -88,7 +88,7 @@ def _preload_patch(module_name: str) -> Patch:
 
         return planted
 
-    return attribute_patch(f"{module_name}:preloads", changed)
+    return attribute_patch(f"{module_name}:static_preloads", changed)
 
 
 def _scaled_wave(original_function: Any) -> Any:

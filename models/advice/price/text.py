@@ -28,7 +28,7 @@ def recommendation_lines(recommendation: Recommendation) -> list[str]:
         f"  DOUBT: {scene.quantity} is at most {recommendation.truth.size:.3g} {scene.unit} itself: "
         f"within {recommendation.tolerance:g} {scene.unit} even zero would do"
     )
-    extent = getattr(scene, "extent", f"over {scene.full_duration:g} s")
+    extent = getattr(scene, "extent_text", f"over {scene.full_duration:g} s")
     return [
         f"{scene.title}: {scene.quantity} within {recommendation.tolerance:g} {scene.unit} {extent}",
         f"  truth: {recommendation.truth.origin} {recommendation.truth.uncertainty:.1e} {scene.unit}",

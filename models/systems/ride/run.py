@@ -57,7 +57,7 @@ def run(
     engine: str = "",
     *,
     vehicle: SpatialVehicle | None = None,
-    sweep_points: SweepPoints | None = None,
+    points: SweepPoints | None = None,
     sampling: "RunSampling | None" = None,
     progress: "Progress" = lambda text, share: None,
     error: bool = False,
@@ -65,7 +65,7 @@ def run(
     """Run a ride scene by covariances of the linear vehicle of an engine, or in time. Raises InputError, Refused or
     RunFailed.
 
-    vehicle, sweep_points : in place of the scene's. sampling : requests a run in time, which nonlinear springs and
+    vehicle, points : in place of the scene's. sampling : requests a run in time, which nonlinear springs and
     tyres that may lift need. The reference then uses statistical linearisation and Monte Carlo copies, an engine one
     random road.
     progress : called during such a run. error : whether errors are estimated, by further solutions or runs. Assumptions
@@ -79,9 +79,7 @@ def run(
         if scene.drive is not None:
             return _drive_deviations(scene, engine, vehicle or vehicle_of(scene), error)
         if vehicle is not None or not (sampling or needs_run_in_time(scene)):
-            return _deviations_by_speed(
-                scene, engine, vehicle or vehicle_of(scene), sweep_points or SweepPoints(), error
-            )
+            return _deviations_by_speed(scene, engine, vehicle or vehicle_of(scene), points or SweepPoints(), error)
         from models.systems.ride import nonlinear
 
         vehicle, sampling = vehicle_of(scene), sampling or nonlinear.RunSampling()
