@@ -388,7 +388,7 @@ def test_functions_whose_faults_change_no_value_are_told_apart_and_their_proofs_
 
 
 VIEWS = [name for name, (why, _) in harmless_functions().items() if why == WHY_HARMLESS[1]]
-STATUSES = ("ask", "solve_contact", "solve_simplified")
+STATUSES = ("call_at_address", "solve_contact", "solve_simplified")
 """Functions that return whole numbers: how a contact ended."""
 
 

@@ -387,7 +387,9 @@ def test_a_new_effect_changes_what_a_price_list_compares(system, new_file):
     less, more = (
         runs.computed_quantities(one, runs.DEFAULT_ENGINE) for one in (scene, with_effects(scene, NEW[system].name))
     )
-    assert any(np.any(more.quantities[name].cases[0] != own.cases[0]) for name, own in less.quantities.items())
+    assert any(
+        np.any(more.quantities[name].case_values[0] != own.case_values[0]) for name, own in less.quantities.items()
+    )
 
 
 def test_a_new_effect_has_a_price_there_and_absent(new_file, monkeypatch):

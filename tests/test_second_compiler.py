@@ -73,13 +73,13 @@ import sys
 from pathlib import Path
 from models.contact.fastsim_many import fill_contact_forces
 from models.multibody.forces import set_forces
-from studies.command.second_compiler import LATE_KERNELS, load_scene, study_of
+from studies.command.second_compiler import LATE_KERNELS, load_scene, study_module_of
 kernel = {"wheelset": fill_contact_forces, "handling": set_forces}[sys.argv[1]]
 LATE_KERNELS[sys.argv[1]]()
 signatures = list(kernel.signatures)
 Path("out").mkdir()
 scene = load_scene(sys.argv[1], sys.argv[2:])
-study_of(scene).run(scene, ("exudyn",), Path("out"), lambda text, share: None)
+study_module_of(scene).run(scene, ("exudyn",), Path("out"), lambda text, share: None)
 print(len(signatures), kernel.signatures == signatures)
 """
 

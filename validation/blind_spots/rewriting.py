@@ -22,7 +22,18 @@ HELPERS = {"spoiled": SPOILED, "scaled": SCALED, "put": PUT}
 COMPILER_PATTERN = re.compile(r"\bnumba\b|machine\.compiled")
 """Pattern in the source of a module that compiles functions with numba."""
 Function = ast.FunctionDef | ast.AsyncFunctionDef
-VIEW_FUNCTIONS = ("array_at", "double_at", "row", "array", "beyond", "start", "at", "records", "reshape", "ravel")
+VIEW_FUNCTIONS = (
+    "array_at",
+    "double_at",
+    "row",
+    "array",
+    "beyond",
+    "start",
+    "at",
+    "records_at_pointer",
+    "reshape",
+    "ravel",
+)
 """Functions of ``models.machine`` and numpy that return a view of their first argument."""
 
 

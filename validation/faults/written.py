@@ -194,7 +194,9 @@ FAULTS = (
     CampaignFault("half widths of patches 1 % off", "tyre", tyre_table_patch(at.HALF_WIDTH, 1.01, ALL_WHEELS)),
     CampaignFault("preload of a spring 1 % off, on tyres", "preload", _preload_patch(TABLE_WRITER)),
     CampaignFault("preload of a spring 1 % off, cut", "preload", _preload_patch("models.vehicles.cut_vehicle")),
-    CampaignFault("one wave of the road 1 % higher", "road", attribute_patch(f"{TABLE_WRITER}:table", _scaled_wave)),
+    CampaignFault(
+        "one wave of the road 1 % higher", "road", attribute_patch(f"{TABLE_WRITER}:free_vehicle_table", _scaled_wave)
+    ),
     CampaignFault(
         "road under one hub 0.1 mm higher",
         "road",
@@ -208,14 +210,18 @@ FAULTS = (
     CampaignFault(
         "wheels of a trailer keep to the car's heading",
         "towing",
-        attribute_patch(f"{TABLE_WRITER}:table", _towed_marks_cleared(at.OF_TYRES, at.TYRES, at.PER_TYRE, at.TOWED)),
+        attribute_patch(
+            f"{TABLE_WRITER}:free_vehicle_table", _towed_marks_cleared(at.OF_TYRES, at.TYRES, at.PER_TYRE, at.TOWED)
+        ),
     ),
     CampaignFault(
         "springs of a trailer keep to the car's heading",
         "towing",
-        attribute_patch(f"{TABLE_WRITER}:table", _towed_marks_cleared(at.OF_PARTS, at.PARTS, PER_PART, FRAME)),
+        attribute_patch(
+            f"{TABLE_WRITER}:free_vehicle_table", _towed_marks_cleared(at.OF_PARTS, at.PARTS, PER_PART, FRAME)
+        ),
     ),
-    CampaignFault("bars 1 % stiffer, on tyres", "bar", attribute_patch(f"{TABLE_WRITER}:_bars", _stiff_bars)),
+    CampaignFault("bars 1 % stiffer, on tyres", "bar", attribute_patch(f"{TABLE_WRITER}:_bar_rows", _stiff_bars)),
     CampaignFault("a bar turned round, cut", "bar", attribute_patch(f"{CUT_TABLE}:_element_numbers", _turned_bar)),
     CampaignFault(
         "inertia of the chassis 1 % off, on tyres",
@@ -230,7 +236,7 @@ FAULTS = (
     CampaignFault(
         "shares of brake and drive swapped in the table",
         "packing",
-        attribute_patch(f"{TABLE_WRITER}:_tyre", _swapped_numbers(at.BRAKED, at.DRIVEN)),
+        attribute_patch(f"{TABLE_WRITER}:_tyre_row", _swapped_numbers(at.BRAKED, at.DRIVEN)),
     ),
     CampaignFault(
         "stiffness and damping swapped in the table, cut",
