@@ -82,10 +82,10 @@ def compile_fastsim() -> None:
     from models.contact.fastsim_many import fill_contact_forces
     from models.contact.fastsim_records import CONTACT, FORCES, GridStrips, StripCells
 
-    strip_values, cell_values = np.empty((4, 0)), np.empty((5, 0))
-    fill_contact_forces(
-        np.empty(0, CONTACT), GridStrips(*strip_values), StripCells(*cell_values, 1.0), 0, 0, np.empty(0, FORCES)
-    )
+    no_strips = GridStrips(*np.empty((4, 0)))
+    centre, bound, middle, start_bound, rate = np.empty((5, 0))
+    no_cells = StripCells(centre, bound, middle, start_bound, rate, 1.0)
+    fill_contact_forces(np.empty(0, CONTACT), no_strips, no_cells, 0, 0, np.empty(0, FORCES))
 
 
 def compile_free_vehicle_forces() -> None:
