@@ -25,8 +25,8 @@ class ContactLag(NamedTuple):
 
 @lean
 def advance_contact_lag(wheel_contacts, half_step, cornering_coefficient, contact_lag, surfaces):
-    """Advance a ``ContactLag`` to half a step (s) after the motion in ``Contacts``; put its slip angles into the
-    ``WheelSurfaces``.
+    """Advance a ``ContactLag`` to half a step (s) after the motion in ``WheelContact`` records; put its slip angles
+    into the ``WheelSurfaces``.
     """
     time = contact_lag.behind[0] + half_step
     for i in range(contact_lag.angle.size):

@@ -70,8 +70,8 @@ class RailWheelSystem:
     """Rail wheels on springs in one Exudyn system.
 
     force_function : forces of positions and rates, None for no contact; route : one of ROUTES; slopes : as those of
-    ``Forces``, for implicit solvers by the generic object; without them Exudyn differentiates by 2 size calls of
-    ``force_function``.
+    ``WheelForceFunctions``, for implicit solvers by the generic object; without them Exudyn differentiates by 2 size
+    calls of ``force_function``.
     """
 
     def __init__(

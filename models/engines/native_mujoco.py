@@ -62,8 +62,9 @@ def end_bodies(native_parts: Sequence[NativePart]) -> set[str]:
 
 
 def add_parts(mujoco_spec: mujoco.MjSpec, vehicle: SpatialVehicle, native_parts: Sequence[NativePart]) -> None:
-    """Add tendons, sites and actuators for native parts to a specification of ``mujoco_tree.spec_of``; ``set_laws``
-    sets their values."""
+    """Add tendons, sites and actuators for native parts to a specification of ``mujoco_tree.mujoco_specification``;
+    ``set_laws`` sets their values.
+    """
     numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
     joints = [f"{numbers[body]} {freedom}" for body, freedom in vehicle.coordinates()]
     for i, part in enumerate(native_parts):

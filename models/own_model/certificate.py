@@ -149,7 +149,7 @@ def softness_difference(user_model: TwinModel, state_count: int) -> float:
 
 
 def reference_of_file(user_model: TwinModel, states: Sequence[State], build_name: str) -> MotionReference:
-    """``Reference`` for a build from the file's model in MuJoCo at some states. Raises RunFailed as ``motion_at``
+    """``MotionReference`` for a build from the file's model in MuJoCo at some states. Raises RunFailed as ``motion_at``
     does."""
     law = partial(expected_equations, build_name=build_name)
     moved = motion_at(law(user_model), states)

@@ -117,8 +117,8 @@ def fill_rates(wheelset_state, speed, wheelset_body, rails, state_rate, contact_
 def fill_rates_with_workspace(
     wheelset_state, speed, wheelset_body, rails, state_rate, contact_report, contact_workspace
 ):
-    """Fill ``state_rate`` with the time derivative of a state (10,). contact_workspace : ``Workspace``, written over;
-    contact_report : has no rows where no contact report is wanted.
+    """Fill ``state_rate`` with the time derivative of a state (10,). contact_workspace : ``WheelForcesWorkspace``,
+    written over; contact_report : has no rows where no contact report is wanted.
     """
     y, z, roll, yaw = wheelset_state[Y], wheelset_state[Z], wheelset_state[ROLL], wheelset_state[YAW]
     roll_rate, yaw_rate, spin = wheelset_state[ROLL_RATE], wheelset_state[YAW_RATE], wheelset_state[SPIN]

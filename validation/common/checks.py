@@ -1,6 +1,6 @@
 """Checks that cases and planted faults share: differences of a built model from the equations and from invariants.
 
-Each check takes ``make_engine``, a function (assembly, settings) -> model, so that it can judge an engine without
+Each check takes ``build_model``, a function (assembly, settings) -> model, so that it can judge an engine without
 (``engine("mujoco")``) and with a planted fault. The difference of a refused or failed run is infinite.
 """
 

@@ -2,8 +2,8 @@
 full scene.
 
 What rigid springs, locked freedoms and bodies without mass leave of the vehicle is said in
-``models.vehicles.spatial.Limits`` and ``models.ride.excited``. The vehicle that is left is made once for all speeds and
-roads, if it does not depend on the speed.
+``models.vehicles.spatial.ReductionLimits`` and ``models.ride.excited``. The vehicle that is left is made once for all
+speeds and roads, if it does not depend on the speed.
 """
 
 from collections.abc import Callable, Hashable
