@@ -9,7 +9,7 @@ from scipy.integrate import quad
 
 from models.core.errors import InputError, RunFailed
 from models.multibody import forces
-from models.multibody.numbers import Controls, ExternalPush, Handling, TyreParameters
+from models.multibody.numbers import Controls, Push, Handling, TyreParameters
 from models.road.plane_waves import plane_waves
 from models.systems.handling.run import SimulatedDrive, drive_run
 from models.systems.handling.scene import build
@@ -114,7 +114,7 @@ def test_what_pushes_a_rotor_pushes_all_that_it_rides_on() -> None:
     still = np.zeros(len(Handling(R19).vehicle.coordinates()))
     found = {}
     for body in ("fl", "fl rotor"):
-        at_centre = ExternalPush(body, R19.body("fl").position, (0.6, 0.8, 0.0), ((0.0, 1000.0),))
+        at_centre = Push(body, R19.body("fl").position, (0.6, 0.8, 0.0), ((0.0, 1000.0),))
         found[body] = still.copy()
         report, ledger = np.zeros((4, forces.REPORTED)), np.zeros(forces.LEDGER)
         forces.all_forces(Handling(R19, pushes=(at_centre,)).numbers, 0.0, still, still, found[body], report, ledger)

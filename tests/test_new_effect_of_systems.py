@@ -20,7 +20,7 @@ from models.core.scene_effects import (
     with_effects,
 )
 from models.core.systems import SYSTEMS, load
-from models.multibody.numbers import ExternalPush, Handling
+from models.multibody.numbers import Push, Handling
 from models.ride.road_path import road_path
 from models.systems.contact.cases_table import solve_table
 from models.systems.contact.run import Built, solved_contact
@@ -128,9 +128,9 @@ NEW = {
         900.0,
         '{"all": {"pushes": 1}}',
         """
-    from models.multibody.numbers import ExternalPush
+    from models.multibody.numbers import Push
 
-    wind = ExternalPush("body", (0.3, 0.0, 0.8), (0.0, 1.0, 0.0), ((0.0, 0.0), (5e-3, p.force)))
+    wind = Push("body", (0.3, 0.0, 0.8), (0.0, 1.0, 0.0), ((0.0, 0.0), (5e-3, p.force)))
     return replace(built, pushes=(*built.pushes, wind))
 """,
     ),
@@ -202,17 +202,13 @@ def test_a_push_from_outside_does_the_work_that_the_vehicle_gains():
     """Energy of the rigid bodies, written without an engine, less the power of all forces by Simpson's rule: a push of
     900 N over some 16 mm puts in 15 J, and 9e-8 J are left."""
     handling = Handling(load_vehicle("r19_free")).changed(
-        pushes=(
-            ExternalPush(
-                "body", (0.3, 0.0, 0.8), (0.0, 1.0, 0.0), ((0.0, 0.0), (0.05, 900.0), (0.3, 900.0), (0.4, 0.0))
-            ),
-        )
+        pushes=(Push("body", (0.3, 0.0, 0.8), (0.0, 1.0, 0.0), ((0.0, 0.0), (0.05, 900.0), (0.3, 900.0), (0.4, 0.0))),)
     )
     drive = drive_run("mujoco", handling, 25.0, 0.5)
     assert np.abs(unaccounted_energy(drive)).max() < 1e-6
     assert drive.path[-1, 1] > 0.04  # m, to the left
     with pytest.raises(InputError, match="no such body"):
-        handling.changed(pushes=(ExternalPush("sail", (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), ((0.0, 1.0),)),))
+        handling.changed(pushes=(Push("sail", (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), ((0.0, 1.0),)),))
 
 
 DAMPERS = New(

@@ -64,7 +64,7 @@ class Controls:
 
 
 @dataclass(frozen=True)
-class ExternalPush:
+class Push:
     """External force on a body, such as wind: ``size`` (N, over time) along ``axis``, x ahead, y to the left and z up.
     The axes turn with the vehicle's heading only. It acts at ``point`` (m) of a body, in the design position."""
 
@@ -89,7 +89,7 @@ class Handling:
     controls: Controls = Controls()
     waves: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
     slope: float = 0.0
-    pushes: tuple[ExternalPush, ...] = ()
+    pushes: tuple[Push, ...] = ()
     forces: Literal["native", "compiled"] = "native"
     vehicle: SpatialVehicle = field(init=False)
     held: Preloads = field(init=False)
@@ -322,7 +322,7 @@ def _push_rows(vehicle_on_tyres: Handling) -> np.ndarray:
     return np.array([*np.ravel(rows), len(rows)])
 
 
-def _control_knots(controls: Controls, pushes: tuple[ExternalPush, ...]) -> np.ndarray:
+def _control_knots(controls: Controls, pushes: tuple[Push, ...]) -> np.ndarray:
     """Knots (3 + pushes, 2, k) of steer, brake, drive and pushes: times and values, padded behind the last knot."""
     all_knots = (controls.steer, controls.brake, controls.drive, *(push.size for push in pushes))
     most = max(map(len, all_knots))

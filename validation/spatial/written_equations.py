@@ -14,7 +14,7 @@ from models.engines.cut_vehicle import PLAIN_ENGINE
 from models.engines.cut_vehicle import build as hub_model
 from models.multibody import forces as at
 from models.multibody.cut_table import HubInputs
-from models.multibody.numbers import Controls, ExternalPush, Handling, TyreParameters
+from models.multibody.numbers import Controls, Push, Handling, TyreParameters
 from models.multibody.plain.bristles import TyrePatches
 from models.multibody.plain.bristles import tyre_forces as plain_tyre_forces
 from models.multibody.plain.rolling import PlainRolling
@@ -58,7 +58,7 @@ def rolling_cars() -> dict[str, Handling]:
     """Test cars by name, steered, braked and driven on a rough road: as shipped, asymmetric, with nonlinear springs,
     with a caravan, and with a trailer; two are on a slope and pushed by a gust."""
     waves, r19 = plane_waves(4e-6, seed=3), load_vehicle("r19_free")
-    gust = ExternalPush("body", (0.3, 0.1, 1.0), (0.1, 1.0, 0.2), ((0.0, 0.0), (0.4, 500.0)))
+    gust = Push("body", (0.3, 0.1, 1.0), (0.1, 1.0, 0.2), ((0.0, 0.0), (0.4, 500.0)))
     return {
         "r19_free": Handling(r19, TyreParameters(), TURN_CONTROLS, waves),
         "twin": Handling(
