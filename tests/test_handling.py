@@ -9,7 +9,7 @@ from scipy.integrate import quad
 
 from models.core.errors import InputError, RunFailed
 from models.multibody import forces
-from models.multibody.numbers import Controls, Push, Handling, TyreParameters
+from models.multibody.numbers import Controls, Handling, Push, TyreParameters
 from models.road.plane_waves import plane_waves
 from models.systems.handling.run import SimulatedDrive, drive_run
 from models.systems.handling.scene import build

@@ -20,7 +20,7 @@ from models.core.scene_effects import (
     with_effects,
 )
 from models.core.systems import SYSTEMS, load
-from models.multibody.numbers import Push, Handling
+from models.multibody.numbers import Handling, Push
 from models.ride.road_path import road_path
 from models.systems.contact.cases_table import solve_table
 from models.systems.contact.run import Built, solved_contact

@@ -14,7 +14,7 @@ from models.engines.cut_vehicle import PLAIN_ENGINE
 from models.engines.cut_vehicle import build as hub_model
 from models.multibody import forces as at
 from models.multibody.cut_table import HubInputs
-from models.multibody.numbers import Controls, Push, Handling, TyreParameters
+from models.multibody.numbers import Controls, Handling, Push, TyreParameters
 from models.multibody.plain.bristles import TyrePatches
 from models.multibody.plain.bristles import tyre_forces as plain_tyre_forces
 from models.multibody.plain.rolling import PlainRolling
