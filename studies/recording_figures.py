@@ -347,7 +347,7 @@ def section_forces_figure(
         RUN_STYLES.get(run_name, RUN_STYLES["kalman"])[1],
     )
     drawn, panels = _panels_over_time(
-        len(section_channels), 1.7 * len(section_channels) + 0.5, columns=2, width_ratios=(2.4, 1)
+        len(section_channels), 1.7 * len(section_channels) + 0.5, column_count=2, width_ratios=(2.4, 1)
     )
     for (left, right), answer in zip(panels, section_channels, strict=True):
         values, unit, scale = recording_run.samples(answer), f"k{answer.unit}", 1e-3
@@ -388,7 +388,7 @@ def measured_and_computed_figure(
     """Save a figure of measured channels that were not inputs of the run, and of the computed ones: over the complete
     time, and for two seconds about the largest error."""
     drawn, panels = _panels_over_time(
-        len(channel_comparisons), 1.7 * len(channel_comparisons) + 0.7, columns=2, width_ratios=(2.4, 1)
+        len(channel_comparisons), 1.7 * len(channel_comparisons) + 0.7, column_count=2, width_ratios=(2.4, 1)
     )
     for (left, right), comparison in zip(panels, channel_comparisons, strict=True):
         common_times, measured, computed = paired_channels(
