@@ -204,7 +204,7 @@ def _spin_inertia_patch(factor: float) -> Patch:
 
     def change(original_property: Any) -> Any:
         return property(
-            lambda truck: _changed_plane(original_property.fget(truck), {"spin": lambda spin: factor * spin})
+            lambda truck: _changed_plane(original_property.fget(truck), {"spin_inertia": lambda spin: factor * spin})
         )
 
     return attribute_patch("models.brake.quarter:QuarterVehicle.plane", change)
