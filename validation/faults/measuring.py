@@ -265,7 +265,7 @@ FAULTS = (
         "noise",
         attribute_patch(
             "models.core.noise:normal_samples",
-            lambda real: lambda s, p, n, c, first=0, source=0: real(s, p, n, c, source=source),
+            lambda real: lambda s, p, n, c, first_sample=0, noise_source=0: real(s, p, n, c, noise_source=noise_source),
         ),
     ),
     CampaignFault(
