@@ -37,11 +37,7 @@ def twinrig_distance(
     """Stopping distance (m) of the quarter vehicle by twinrig, from a speed (m/s)."""
     chambers = BrakeChambers(np.array([FILL]), np.array([EMPTY]), SUPPLY)
     vehicle = braked_vehicle_on_tyres(
-        quarter_car.plane,
-        [table_of_surface(surface_name)],
-        brakes_of_wheels(brake),
-        chambers,
-        substep_count=substep_count,
+        quarter_car.plane, [table_of_surface(surface_name)], brakes_of_wheels(brake), chambers, substeps=substep_count
     )
     return float(vehicle.run(controller, speed).states[-1, 0, 0])
 

@@ -101,17 +101,15 @@ def _caravan_brakes_rows() -> list[Row]:
     """Rows: deceleration, axle load and ball force while the caravan brakes alone, compared with the closed form."""
     errors = train.caravan_errors()
     quantities = {
-        "deceleration": "deceleration of a train whose caravan brakes alone, wheels locked",
-        "load": "load of the axle of a caravan that brakes alone",
-        "pull": "force at the ball of a caravan that brakes alone",
+        "deceleration": (errors.deceleration, "deceleration of a train whose caravan brakes alone, wheels locked"),
+        "load": (errors.axle_load, "load of the axle of a caravan that brakes alone"),
+        "pull": (errors.ball_force, "force at the ball of a caravan that brakes alone"),
     }
     return [
-        Observed(
-            f"braking_trailer.alone.{key}", SYSTEM, f"{what} / closed form - 1", abs(float(getattr(errors, key))), ""
-        ).at_most(
+        Observed(f"braking_trailer.alone.{key}", SYSTEM, f"{what} / closed form - 1", abs(float(error)), "").at_most(
             STATICS_TOLERANCE, "moments about the ball and momentum of both; springs lean by 2.7 mrad", "closed form"
         )
-        for key, what in quantities.items()
+        for key, (error, what) in quantities.items()
     ]
 
 

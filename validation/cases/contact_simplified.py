@@ -161,7 +161,7 @@ def _errors_of_variants(contact_shape: Shape) -> dict[str, Any]:
             )
         ]
         mean, most = (float(np.mean(forces)), float(np.max(forces))) if forces else (np.nan, np.nan)
-        errors_by_fitting[name] = _relative_errors(contact, **figures) | {"force": mean, "force_max": most}
+        errors_by_fitting[name] = _relative_errors(contact, *figures.values()) | {"force": mean, "force_max": most}
     return {"exact": figures, "ways": errors_by_fitting, "rolling": len(solved), "asked": len(exact)}
 
 

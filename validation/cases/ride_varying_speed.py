@@ -173,7 +173,7 @@ def _drive_comparison(speed_profile: SpeedProfile) -> dict[str, Any]:
     vehicle, road = vehicle_and_road("r19_ride")
     instants = speed_profile.times[-1] * np.array([0.25, 0.6, 0.95])
     copies, slow = _timed_call(
-        variances_along_drive, vehicle, road, speed_profile, instants, copies=MONTE_CARLO_COPY_COUNT, seed=SEED
+        variances_along_drive, vehicle, road, speed_profile, instants, copy_count=MONTE_CARLO_COPY_COUNT, seed=SEED
     )
     varied, fast = _timed_call(varying_speed, vehicle, road, speed_profile, instants=copies.time)
     often = np.linspace(speed_profile.times[0], speed_profile.times[-1], 101)
@@ -243,7 +243,13 @@ def _constant_speed_rows() -> list[Row]:
         / TIMED_REPEAT_COUNT
     )
     copies, slow = _timed_call(
-        variances_at_constant_speed, vehicle, road, STEADY_SPEED, STEADY_SECONDS, copies=STEADY_COPY_COUNT, seed=SEED
+        variances_at_constant_speed,
+        vehicle,
+        road,
+        STEADY_SPEED,
+        STEADY_SECONDS,
+        copy_count=STEADY_COPY_COUNT,
+        seed=SEED,
     )
     columns = [copies.names.index(point) for point in BODY_POINTS]
     z = copies.z(exact.deviation[None])[0]

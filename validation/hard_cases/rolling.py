@@ -260,7 +260,7 @@ def too_large_step_naive_result(work_folder: Path) -> str:
 
 REFUSED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 RAISED: dict[str, OutcomeWord] = dict.fromkeys(IMPLEMENTATIONS, "raised")
-FAST_RUN, STEEP_RUN = dict[str, Any](speed=200.0, step=2e-4), dict[str, Any](speed=20.0, step=1e-4)
+FAST_RUN, STEEP_RUN = dict[str, Any](speed=200.0, time_step=2e-4), dict[str, Any](speed=20.0, time_step=1e-4)
 CASES = (
     HardCase(
         "wheelset that stands on a slope",

@@ -72,7 +72,7 @@ def _sample_of_path(scene: WheelsetScene, engine: str, speed: float) -> Sample:
         marched.append((len(path.times) - 1) * _count_of_cells(other_scene))
         return path
 
-    with mock.patch.object(system, "path", counted):
+    with mock.patch.object(system, "simulated_path", counted):
         run = system.run(scene, engine, speed, error=True)
     true = _true_errors(scene, run, lambda changed_scene: march(changed_scene, "reference", speed))
     estimates = error_estimates_of(run)
