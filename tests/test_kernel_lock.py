@@ -121,3 +121,15 @@ def test_a_killed_process_holds_nobody_up(tmp_path):
     first.kill()
     first.wait()
     assert second.communicate(timeout=60)[0] == "6.0 1\n"
+
+
+def test_a_file_system_without_locks_leaves_nothing_open(tmp_path, monkeypatch):
+    def refused(file, operation):
+        opened.append(file)
+        raise OSError("no locks available")
+
+    opened = []
+    monkeypatch.setattr(alone.fcntl, "flock", refused)
+    lock = KernelLock(tmp_path / "kernel.lock")
+    lock.take()
+    assert lock._file is None and opened[0].closed

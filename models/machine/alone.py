@@ -5,7 +5,7 @@ A process that is killed gives its lock back. Nothing depends on the lock: where
 """
 
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -33,11 +33,11 @@ class KernelLock:
             return
         with suppress(OSError):  # a folder that cannot be written to, a file system without locks
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            file = self.path.open("wb")
-            if _is_locked_in_time(file):
-                self._file = file
-            else:
-                file.close()
+            with ExitStack() as opened:
+                file = opened.enter_context(self.path.open("wb"))
+                if _is_locked_in_time(file):
+                    self._file = file
+                    opened.pop_all()  # it stays open, and locked
 
     def give_back(self) -> None:
         """Give the lock back, if this process has it, and remove its file."""

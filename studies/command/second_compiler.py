@@ -17,13 +17,11 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from studies.command.asked import load_scene, runs_without_extras, study_module_of
-from studies.command.waiting import CompilationTimer
+from studies.command.waiting import CompilationObserver
 
 
-class SecondCompiler(CompilationTimer):
+class SecondCompiler(CompilationObserver):
     """Observer of compilation that starts a command once, when this process compiles a kernel that it did not load."""
-
-    EVENT = "numba:compile"
 
     def __init__(self, process_command: list[str]) -> None:
         super().__init__()

@@ -34,15 +34,14 @@ ReportProgress = Callable[[str, float], None]
 """Function that reports progress: the current task as text, and the finished share (0 to 1) of all work."""
 
 
-class CompilationTimer:
-    """Timer of numba's compilations: their total time (s), and the start time of a running one; numba's events call
-    ``_start`` and ``_end_compilation``."""
+class CompilationObserver:
+    """Observer of an event of numba, which calls ``_start`` and ``_end_compilation``; here they do nothing."""
 
-    EVENT: ClassVar[str] = "numba:compiler_lock"
-    """Name of numba's event that is observed: it lasts as long as a kernel is compiled or loaded."""
+    EVENT: ClassVar[str] = "numba:compile"
+    """Name of the event: by default it lasts as long as a kernel is compiled that could not be loaded."""
 
     def __init__(self) -> None:
-        self.depth, self.total, self.since, self.attached = 0, 0.0, 0.0, False
+        self.attached = False
         self._remove: Callable[[], None] = lambda: None
 
     def attach(self) -> None:
@@ -57,6 +56,23 @@ class CompilationTimer:
     def detach(self) -> None:
         """Stop listening to numba's compilation events."""
         self._remove()
+
+    def _start(self, *compiler_event: Any) -> None:
+        pass
+
+    def _end_compilation(self, *compiler_event: Any) -> None:
+        pass
+
+
+class CompilationTimer(CompilationObserver):
+    """Timer of numba's compilations: their total time (s), and the start time of a running one."""
+
+    EVENT = "numba:compiler_lock"
+    """Name of the event, which lasts as long as a kernel is compiled or loaded."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.depth, self.total, self.since = 0, 0.0, 0.0
 
     def _start(self, *compiler_event: Any) -> None:
         if self.depth == 0:
