@@ -149,7 +149,7 @@ def _promise_rows(verdicts: list[list[Verdict]], refusal_reasons: list[str]) -> 
 
 
 def _slower_setting_count(verdicts: list[Verdict], cost_kind: str) -> int:
-    """Number of recommended settings that are slower than promised, by one kind of cost."""
+    """Number of recommended settings that cost more than the engine's default, by one kind of cost."""
     return sum(verdict.slower for verdict in verdicts if verdict.kind == cost_kind)
 
 
